@@ -1,0 +1,38 @@
+# make fly    set up, fly the report's nominal case on the ROS graph, draw its figures
+# make test   set up, check the style, run the tests
+# make bench  set up, measure the rates that docs/performance.md speaks of
+# make venv   set up alone: .venv, with ROS 2 from PyPI
+
+FITS := import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
+PYTHON ?= $(shell for python in python3 python3.12 python3.11; do \
+	$$python -c '$(FITS)' 2>/dev/null && echo $$python && break; done)
+OUT ?= flights/nominal_di-$(shell date +%Y%m%d-%H%M%S)
+BIN := .venv/bin
+READY := .venv/ready
+MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis test setup.py
+
+.PHONY: fly test bench venv clean
+
+fly: venv
+	@$(BIN)/ahv fly nominal_di --out $(OUT)
+	@$(BIN)/ahv figures $(OUT)/bag --out $(OUT)/figures
+
+test: venv
+	$(BIN)/ruff check $(MODULES)
+	$(BIN)/ruff format --check $(MODULES)
+	$(BIN)/python -m pytest
+
+bench: venv
+	@$(BIN)/python -m test.benchmark
+
+venv: $(READY)
+
+$(READY): setup.py setup.cfg pyproject.toml package.xml
+	@$(or $(PYTHON),false) -c '$(FITS)' || \
+	{ echo "ahv needs Python 3.11 or 3.12: make PYTHON=/path/to/python3.12" >&2; exit 2; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --editable '.[ros,test]'
+	@touch $(READY)
+
+clean:
+	rm -rf .venv build install log *.egg-info

@@ -1,0 +1,84 @@
+"""Reading a bag back as arrays."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import yaml
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.errors import ReaderError
+from rosbags.typesys import Stores, get_typestore
+
+from ahv_analysis.bag_writer import NOTES, BagError
+from ahv_analysis.record import FlightRecord
+from ahv_msgs_py.layout import MessageError
+from ahv_msgs_py.topics import (
+    ATTITUDE_COMMAND,
+    LOOP_TOPICS,
+    RATE_COMMAND,
+    STATE,
+    SURFACE_COMMAND,
+    THROTTLE_COMMAND,
+    LoopTopic,
+)
+
+
+def read_bag(path: Path) -> FlightRecord:
+    """The flight in the bag folder `path`; BagError says in one sentence what is wrong with it.
+
+    Only steps with a state and all four commands are returned, in the order of their stamps.
+    """
+    if not (path / "metadata.yaml").is_file():
+        raise BagError(f"{path} is not a bag: a bag is a folder with a metadata.yaml")
+    try:
+        with Reader(path) as reader:
+            series = {topic.name: _series(reader, topic) for topic in LOOP_TOPICS}
+    except (ReaderError, MessageError, OSError, KeyError, ValueError, AssertionError) as error:
+        raise BagError(
+            f"{path} cannot be read as a bag: {' '.join(str(error).split())}"
+        ) from error
+    missing = [name for name, messages in series.items() if not messages]
+    if missing:
+        raise BagError(f"{path} holds no messages on {', '.join(missing)}")
+    stamps = sorted(set.intersection(*(set(messages) for messages in series.values())))
+    arrays = {
+        name: np.array([messages[stamp] for stamp in stamps]) for name, messages in series.items()
+    }
+    return FlightRecord(
+        np.array(stamps),
+        arrays[STATE.name],
+        arrays[ATTITUDE_COMMAND.name],
+        arrays[RATE_COMMAND.name],
+        arrays[SURFACE_COMMAND.name],
+        arrays[THROTTLE_COMMAND.name][:, 0],
+        _geometric(path),
+    )
+
+
+def _series(reader: Reader, topic: LoopTopic) -> dict[int, tuple[float, ...]]:
+    """Values of a topic by stamp [ns]."""
+    connections = [
+        connection
+        for connection in reader.connections
+        if (connection.topic, connection.msgtype) == (topic.name, topic.layout.type_name)
+    ]
+    return dict(
+        topic.layout.decode(data) or _general(topic, connection, data)
+        for connection, _, data in reader.messages(connections)
+    )
+
+
+def _general(
+    topic: LoopTopic, connection: Connection, data: bytes
+) -> tuple[int, tuple[float, ...]]:
+    """Read a message of another sender, whose layout is not the usual one."""
+    message = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, connection.msgtype)
+    return topic.layout.values_of(message)
+
+
+def _geometric(path: Path) -> bool:
+    """Which altitude the flight used; a bag without notes is taken to use the default."""
+    metadata = yaml.safe_load((path / "metadata.yaml").read_text())
+    notes = (metadata["rosbag2_bagfile_information"].get("custom_data") or {}).get(NOTES)
+    return bool(notes) and bool(json.loads(notes)["parameters"]["plant"]["geometric_altitude"])

@@ -1,0 +1,134 @@
+"""Case files: a flight's settings as a ROS parameter file, read and checked without ROS.
+
+The same file sets up a flight here and a node by `--ros-args --params-file`.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from ahv_control.flight_control import FlightControl
+from ahv_control.parameters import (
+    INNER_LOOP_PARAMETERS,
+    OUTER_INTERMEDIATE_PARAMETERS,
+    VELOCITY_PARAMETERS,
+    inner_loop,
+    intermediate_loop,
+    outer_loop,
+    velocity_loop,
+)
+from ahv_msgs_py.parameters import ParameterError, Value, check_parameters
+from ahv_msgs_py.topics import NAMESPACE
+from ahv_plant.parameters import PLANT_PARAMETERS, PlantSettings, plant_settings
+
+EVERY_NODE = "/**"
+NODES = {
+    "plant": PLANT_PARAMETERS,
+    "outer_intermediate": OUTER_INTERMEDIATE_PARAMETERS,
+    "inner_loop": INNER_LOOP_PARAMETERS,
+    "velocity": VELOCITY_PARAMETERS,
+}
+
+
+class Case(NamedTuple):
+    """A flight as it is set up."""
+
+    name: str
+    parameters: dict[str, dict[str, Value]]  # of every node, complete and checked
+    plant: PlantSettings
+    control: FlightControl
+
+
+def notes(case: Case) -> str:
+    """What to file with the bag of a flight: the case's name and all parameters, as JSON."""
+    return json.dumps({"case": case.name, "parameters": case.parameters})
+
+
+def config_folder() -> Path:
+    """Folder `config` of the source tree, or of the installation."""
+    source = Path(__file__).resolve().parent.parent
+    if (source / "package.xml").exists():
+        return source / "config"
+    # setuptools installs into <prefix>/lib/pythonX.Y/site-packages, and data into <prefix>/share
+    for prefix in (*source.parents, Path(sys.prefix)):
+        if (prefix / "share" / "ahv" / "config").is_dir():
+            return prefix / "share" / "ahv" / "config"
+    raise FileNotFoundError("the configuration of ahv is not installed beside its code")
+
+
+def case_names() -> list[str]:
+    """Cases that come with the package."""
+    return sorted(path.stem for path in (config_folder() / "cases").glob("*.yaml"))
+
+
+def load_case(name: str, duration: float | None = None) -> Case:
+    """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
+
+    `duration` [s] replaces that of the file.
+    """
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml"):
+        path = config_folder() / "cases" / f"{name}.yaml"
+    if not path.is_file():
+        raise ParameterError(
+            f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
+        )
+    given = _read(path)
+    if duration is not None:
+        given["plant"]["duration"] = duration
+    parameters = {
+        node: check_parameters(f"{path.name}: {node}", known, given[node])
+        for node, known in NODES.items()
+    }
+    control = FlightControl(
+        outer_loop(parameters["outer_intermediate"]),
+        intermediate_loop(parameters["outer_intermediate"]),
+        inner_loop(parameters["inner_loop"]),
+        velocity_loop(parameters["velocity"]),
+    )
+    return Case(path.stem, parameters, plant_settings(parameters["plant"]), control)
+
+
+def _read(path: Path) -> dict[str, dict[str, object]]:
+    """Parameters per node as the file gives them, those of `/**` handed to the nodes that know them."""
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+        reason = " ".join(str(error).split())
+        raise ParameterError(f"{path.name}: not a readable YAML file: {reason}") from error
+    sections: dict[str, dict[str, object]] = {}
+    valid = [EVERY_NODE] + [f"{NAMESPACE}/{node}" for node in NODES]
+    if not isinstance(content, dict):
+        raise ParameterError(f"{path.name}: must have sections {', '.join(valid)}")
+    for section, body in content.items():
+        if section not in valid:
+            raise ParameterError(
+                f"{path.name}: there is no node {section!r}; valid are {', '.join(valid)}"
+            )
+        if not isinstance(body, dict) or not isinstance(body.get("ros__parameters"), dict):
+            raise ParameterError(f"{path.name}: {section} must hold a section ros__parameters")
+        sections[section] = _flat(body["ros__parameters"])
+    shared = sections.get(EVERY_NODE, {})
+    everywhere = {parameter.name for known in NODES.values() for parameter in known}
+    for name in shared:
+        if name not in everywhere:
+            raise ParameterError(f"{path.name}: {EVERY_NODE}: no node has a parameter {name!r}")
+    return {
+        node: {name: shared[name] for name in shared if name in {p.name for p in known}}
+        | sections.get(f"{NAMESPACE}/{node}", {})
+        for node, known in NODES.items()
+    }
+
+
+def _flat(tree: dict[str, object], prefix: str = "") -> dict[str, object]:
+    """Nested sections as dotted names, as ROS has them."""
+    flat: dict[str, object] = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat

@@ -1,0 +1,99 @@
+"""A flight on the ROS graph, all nodes in this process, in lockstep."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import rclpy
+from rclpy.experimental import EventsExecutor
+
+from ahv_analysis.case import Case, notes
+from ahv_analysis.flight import fly
+from ahv_analysis.recorder_node import RecorderNode
+from ahv_control.inner_loop_node import InnerLoopNode
+from ahv_control.outer_intermediate_node import OuterIntermediateNode
+from ahv_control.velocity_node import VelocityNode
+from ahv_msgs_py.base_node import BaseNode
+from ahv_plant.plant_node import PlantNode
+
+LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
+LOOK = 0.2  # [s] between looks at the progress
+
+
+class GraphError(RuntimeError):
+    """The graph did not do what a graph must; the message is one sentence."""
+
+
+def fly_graph(
+    case: Case,
+    bag: Path | None,
+    *,
+    domain: int | None = None,
+    progress: Callable[[int], None] = lambda steps: None,
+) -> tuple[str, float]:
+    """Fly `case` on a graph of its own context; record to `bag` unless that is None.
+
+    `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did not)
+    and the seconds from the first state to the last command. Raises ParameterError for settings that
+    a node refuses and GraphError if the graph stops.
+    """
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    executor = EventsExecutor(context=context)
+    nodes: list[BaseNode] = []
+    try:
+        recorder = None
+        if bag is not None:
+            recorder = RecorderNode({"bag": str(bag), "notes": notes(case)}, context)
+            nodes.append(recorder)
+        for name, node_class in (
+            ("outer_intermediate", OuterIntermediateNode),
+            ("inner_loop", InnerLoopNode),
+            ("velocity", VelocityNode),
+        ):
+            nodes.append(node_class(case.parameters[name], context))
+        listeners = len(nodes)
+        plant = PlantNode(case.parameters["plant"] | {"listeners": listeners}, context)
+        nodes.append(plant)
+        for node in nodes:
+            executor.add_node(node)
+        for _ in zip(range(2), fly(case), strict=False):
+            pass  # compile the laws before the clock runs
+        started = time.perf_counter()
+        _spin(executor, plant, progress)
+        wall = time.perf_counter() - started
+        if recorder is not None:
+            _drain(executor, recorder, plant.step)
+        return plant.finished.result(), wall
+    finally:
+        for node in nodes:
+            executor.remove_node(node)
+        executor.shutdown()
+        for node in reversed(nodes):
+            node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def _spin(executor: EventsExecutor, plant: PlantNode, progress: Callable[[int], None]) -> None:
+    """Run the graph until the flight is over."""
+    last, since = -1, time.monotonic()
+    while not plant.finished.done():
+        executor.spin_until_future_complete(plant.finished, LOOK)
+        progress(plant.step)
+        if plant.step != last:
+            last, since = plant.step, time.monotonic()
+        elif time.monotonic() - since > LONGEST_SILENCE:
+            raise GraphError(
+                f"the graph stopped at step {plant.step}: no answer for {LONGEST_SILENCE:g} s"
+            )
+
+
+def _drain(executor: EventsExecutor, recorder: RecorderNode, steps: int) -> None:
+    """Let the recorder take what is still under way."""
+    deadline = time.monotonic() + LONGEST_SILENCE
+    while recorder.missing(steps):
+        executor.spin_once(LOOK)
+        if time.monotonic() > deadline:
+            raise GraphError(f"the recorder missed {recorder.missing(steps)} messages")

@@ -1,0 +1,80 @@
+"""A flight as arrays, whether it comes from a bag or from memory, and what is derived from it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahv_analysis.flight import Step
+from ahv_msgs_py.layout import NANOSECONDS
+from ahv_plant.aerodynamics import AirData, air_data
+from ahv_plant.constants import UNSTART_ALPHA
+from ahv_plant.state import State
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FlightRecord:
+    """N + 1 states and the commands that answer them."""
+
+    stamps: NDArray[np.int64]  # (N+1,) [ns]
+    states: Array  # (N+1, 13) in the order and units of State
+    attitude_commands: Array  # (N+1, 3) [rad]
+    rate_commands: Array  # (N+1, 3) [rad/s]
+    surfaces: Array  # (N+1, 3) [rad]
+    throttle: Array  # (N+1,) [-]
+    geometric: bool  # h is a geometric altitude
+
+    @property
+    def steps(self) -> int:
+        """Number of integration steps N."""
+        return len(self.stamps) - 1
+
+    @property
+    def time(self) -> Array:
+        """Time (N+1,) [s]."""
+        return self.stamps / NANOSECONDS
+
+    def column(self, name: str) -> Array:
+        """One state (N+1,) by its name."""
+        column: Array = self.states[:, State._fields.index(name)]
+        return column
+
+    @cached_property
+    def air(self) -> AirData:
+        """Air data, every field an array (N+1,)."""
+        rows = [air_data(State(*row), self.geometric) for row in self.states.tolist()]
+        return AirData(*np.array(rows).T)
+
+    @cached_property
+    def climb_angle(self) -> Array:
+        """Flight path angle gamma (N+1,) [rad], the angle of the velocity above the horizon."""
+        u, v, w = (self.column(name) for name in "uvw")
+        phi, theta = self.column("phi"), self.column("theta")
+        down = v * np.sin(phi) + w * np.cos(phi)
+        climb = u * np.sin(theta) - down * np.cos(theta)
+        angle: Array = np.arcsin(climb / self.air.speed)
+        return angle
+
+    @property
+    def inlet_started(self) -> bool:
+        """Whether the inlet stayed started: |alpha| <= 5 deg throughout."""
+        return bool(np.all(np.abs(self.air.alpha) <= UNSTART_ALPHA))
+
+
+def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
+    """Arrays of the steps of a library flight."""
+    flown = list(steps)
+    answers = [step.commands for step in flown]
+    return FlightRecord(
+        np.array([step.stamp for step in flown]),
+        np.array([step.state for step in flown]),
+        np.array([answer.attitude for answer in answers]),
+        np.array([answer.rates for answer in answers]),
+        np.array([answer.surfaces for answer in answers]),
+        np.array([answer.throttle for answer in answers]),
+        geometric,
+    )

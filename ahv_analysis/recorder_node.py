@@ -1,0 +1,57 @@
+"""Node `recorder`: every topic of the graph into an MCAP bag, the bytes as they came."""
+
+from functools import partial
+from pathlib import Path
+
+import rclpy
+
+from ahv_analysis.bag_writer import BagError, BagWriter
+from ahv_msgs_py.base_node import OK, QOS, VOLATILE_QOS, BaseNode, message_class, run
+from ahv_msgs_py.parameters import Parameter, ParameterError, Value
+from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
+
+RECORDER_PARAMETERS = (
+    Parameter("bag", "bag", "folder of the bag to write; it must not exist"),
+    Parameter("notes", "", "text to file with the bag"),
+)
+
+
+class RecorderNode(BaseNode):
+    """Listens to every topic; the bag is complete once the node is destroyed."""
+
+    def __init__(
+        self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
+    ):
+        """`values` overrides parameters; ParameterError if the bag cannot be made."""
+        super().__init__("recorder", RECORDER_PARAMETERS, values, context)
+        try:
+            self._bag = BagWriter(Path(str(self.settings["bag"])), str(self.settings["notes"]))
+        except BagError as error:
+            raise ParameterError(f"recorder: bag: {error}") from error
+        topics = [(topic.name, topic.layout.type_name, QOS) for topic in LOOP_TOPICS]
+        topics += [
+            (topic.name, topic.type_name, QOS if topic.durable else VOLATILE_QOS)
+            for topic in VIEWER_TOPICS
+        ]
+        for name, type_name, quality in topics:
+            try:
+                message_type = message_class(type_name)
+            except ModuleNotFoundError:
+                continue  # /tf where tf2_msgs is not installed: then nobody here can send it either
+            write = partial(self._bag.write, name)
+            self.create_subscription(message_type, name, write, quality, raw=True)
+        self.report(0, OK, f"recording to {self._bag.path}")
+
+    def missing(self, steps: int) -> int:
+        """How many messages of the loop are still to come, if the flight has this many steps."""
+        return sum(max(0, steps + 1 - self._bag.counts[topic.name]) for topic in LOOP_TOPICS)
+
+    def destroy_node(self) -> None:
+        """Close the bag, then the node."""
+        self._bag.close()
+        super().destroy_node()
+
+
+def main() -> None:
+    """Run the node."""
+    run(RecorderNode)

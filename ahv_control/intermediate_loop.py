@@ -1,0 +1,42 @@
+"""Intermediate loop: from attitude error to the body-rate command (section 3.2)."""
+
+from typing import NamedTuple
+
+from ahv_control.outer_loop import Attitude
+from ahv_plant.compiled import elementwise
+from ahv_plant.elementary import sin_cos
+from ahv_plant.state import State
+
+
+class IntermediateLoop(NamedTuple):
+    """Settings of the intermediate loop."""
+
+    k_phi: float  # [1/s]
+    k_theta: float  # [1/s]
+    k_psi: float  # [1/s]
+
+
+class Rates(NamedTuple):
+    """Body rates or commands for them [rad/s], or their own rates [rad/s^2]."""
+
+    P: float  # roll
+    Q: float  # pitch
+    R: float  # yaw
+
+
+@elementwise
+def rate_command(state: State, command: Attitude, settings: IntermediateLoop) -> Rates:
+    """Body rates P*, Q*, R* that close the attitude error at the gains, section 3.2.
+
+    The inverse of eq 2.4's matrix, written out: it has no singularity, unlike the matrix itself.
+    """
+    sin_phi, cos_phi = sin_cos(state.phi)
+    sin_theta, cos_theta = sin_cos(state.theta)
+    phi_dot = settings.k_phi * (command.phi - state.phi)
+    theta_dot = settings.k_theta * (command.theta - state.theta)
+    psi_dot = settings.k_psi * (command.psi - state.psi)
+    return Rates(
+        phi_dot - psi_dot * sin_theta,
+        theta_dot * cos_phi + psi_dot * sin_phi * cos_theta,
+        -theta_dot * sin_phi + psi_dot * cos_phi * cos_theta,
+    )

@@ -1,0 +1,37 @@
+"""Outer loop: from altitude error to the attitude command (section 3.1)."""
+
+from math import sqrt
+from typing import NamedTuple
+
+from ahv_plant.compiled import elementwise
+from ahv_plant.elementary import asin, atan, sin_cos
+from ahv_plant.state import State
+
+
+class OuterLoop(NamedTuple):
+    """Settings of the outer loop."""
+
+    altitude: float  # [m] h*
+    k_h: float  # [1/s]
+
+
+class Attitude(NamedTuple):
+    """Euler angles, or commands for them."""
+
+    phi: float  # [rad] roll
+    theta: float  # [rad] pitch
+    psi: float  # [rad] yaw
+
+
+@elementwise
+def attitude_command(state: State, settings: OuterLoop) -> Attitude:
+    """Attitude that closes the altitude error at rate k_h, eq 3.1; roll and yaw are zero.
+
+    Solves h_dot = k_h (h* - h) for theta. The report prints a minus before the arcsine, with which
+    the altitude runs away; its own line above gives the plus (docs/errata.md).
+    """
+    sin_phi, cos_phi = sin_cos(state.phi)
+    B = state.v * sin_phi + state.w * cos_phi
+    climb = settings.k_h * (settings.altitude - state.h)
+    theta = atan(B / state.u) + asin(climb / sqrt(state.u * state.u + B * B))
+    return Attitude(0.0, theta, 0.0)

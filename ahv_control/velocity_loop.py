@@ -1,0 +1,33 @@
+"""Velocity loop: from speed error to the throttle (section 3.4)."""
+
+from typing import NamedTuple
+
+from ahv_plant.aerodynamics import aerodynamic_coefficients, air_data, loads
+from ahv_plant.compiled import elementwise
+from ahv_plant.constants import GRAVITY, MAXIMUM_THRUST
+from ahv_plant.elementary import sin_cos
+from ahv_plant.mass_properties import centre_of_gravity
+from ahv_plant.state import State, Surfaces, limit_throttle
+
+
+class VelocityLoop(NamedTuple):
+    """Settings of the velocity loop."""
+
+    speed: float  # [m/s] u*
+    k_u: float  # [1/s]
+    geometric: bool  # h is a geometric altitude
+
+
+@elementwise
+def throttle_command(state: State, surfaces: Surfaces, settings: VelocityLoop) -> float:
+    """Throttle sigma_T [-] that closes the error of the forward speed u at k_u, eq 3.2."""
+    air = air_data(state, settings.geometric)
+    aero = loads(
+        air, aerodynamic_coefficients(air, state, surfaces), centre_of_gravity(state.mass)
+    )
+    sin_theta, _ = sin_cos(state.theta)
+    without_thrust = (
+        state.R * state.v - state.Q * state.w - GRAVITY * sin_theta + aero.Fx / state.mass
+    )
+    wanted = settings.k_u * (settings.speed - state.u) - without_thrust
+    return limit_throttle(state.mass / MAXIMUM_THRUST * wanted)

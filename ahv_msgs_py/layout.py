@@ -1,0 +1,103 @@
+"""Messages of fixed layout as bytes: what crosses a topic, exactly, at a fifth of the usual cost.
+
+A message whose frame and names are constant has a constant layout in CDR (little-endian, OMG DDS-XTypes
+7.4.3, version 1). A layout writes and reads such messages with one `struct` call. Every double keeps
+all its bits. The types stay ordinary ROS types, so that any tool reads them; a message of another
+sender with another layout is read the general way, by `values_of` its deserialized object.
+"""
+
+from collections.abc import Sequence
+from struct import Struct
+from typing import Any
+
+NANOSECONDS = 1_000_000_000  # [ns/s]
+_ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little-endian, no options
+
+
+_CLOCK = Struct("<4siI")
+
+
+def clock_bytes(stamp: int) -> bytes:
+    """rosgraph_msgs/Clock at `stamp` [ns] as CDR bytes."""
+    return _CLOCK.pack(_ENCAPSULATION, *divmod(stamp, NANOSECONDS))
+
+
+class MessageError(ValueError):
+    """A message that does not carry what its topic promises; the message says what is wrong."""
+
+
+def _string(text: str, offset: int) -> bytes:
+    """CDR of a string that starts at `offset` after the encapsulation, its padding before it."""
+    data = text.encode() + b"\x00"
+    return bytes(-offset % 4) + Struct("<I").pack(len(data)) + data
+
+
+class Layout:
+    """A stamped message with a constant frame and a fixed number of doubles."""
+
+    def __init__(
+        self, type_name: str, frame: str, fields: Sequence[str], middle: bytes, end: bytes
+    ):
+        """`middle` lies between frame and first double (padding left out), `end` after the last."""
+        self.type_name = type_name
+        self.frame = frame
+        self.fields = tuple(fields)
+        constant = _string(frame, 8) + middle
+        constant += bytes(-(8 + len(constant)) % 8)
+        self._struct = Struct(f"<4siI{len(constant)}s{len(self.fields)}d{len(end)}s")
+        self._constant = constant
+        self._end = end
+
+    def encode(self, stamp: int, values: Sequence[float]) -> bytes:
+        """The message at `stamp` [ns] as CDR bytes."""
+        seconds, nanoseconds = divmod(stamp, NANOSECONDS)
+        return self._struct.pack(
+            _ENCAPSULATION, seconds, nanoseconds, self._constant, *values, self._end
+        )
+
+    def decode(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Stamp [ns] and values of CDR bytes; None if they are not of exactly this layout."""
+        if len(data) != self._struct.size:
+            return None
+        head, seconds, nanoseconds, constant, *values, end = self._struct.unpack(data)
+        if head != _ENCAPSULATION or constant != self._constant or end != self._end:
+            return None
+        return seconds * NANOSECONDS + nanoseconds, tuple(values)
+
+    def values_of(self, message: Any) -> tuple[int, tuple[float, ...]]:
+        """Stamp [ns] and values of a message object of this type; MessageError if they do not fit."""
+        stamp = message.header.stamp
+        return stamp.sec * NANOSECONDS + stamp.nanosec, self._read(message)
+
+    def _read(self, message: Any) -> tuple[float, ...]:
+        raise NotImplementedError
+
+
+class NamedVector(Layout):
+    """sensor_msgs/JointState as a named vector: `name` and `position`, the other fields empty."""
+
+    def __init__(self, frame: str, names: Sequence[str]):
+        offset = 8 + len(_string(frame, 8))
+        middle = bytes(-offset % 4) + Struct("<I").pack(len(names))
+        for name in names:
+            middle += _string(name, offset + len(middle))
+        middle += bytes(-(offset + len(middle)) % 4) + Struct("<I").pack(len(names))
+        super().__init__("sensor_msgs/msg/JointState", frame, names, middle, bytes(8))
+
+    def _read(self, message: Any) -> tuple[float, ...]:
+        if tuple(message.name) != self.fields or len(message.position) != len(self.fields):
+            raise MessageError(
+                f"names {list(message.name)} with {len(message.position)} positions, "
+                f"but must be {list(self.fields)}, one position each"
+            )
+        return tuple(message.position)
+
+
+class StampedVector(Layout):
+    """geometry_msgs/Vector3Stamped: three doubles."""
+
+    def __init__(self, frame: str, fields: Sequence[str]):
+        super().__init__("geometry_msgs/msg/Vector3Stamped", frame, fields, b"", b"")
+
+    def _read(self, message: Any) -> tuple[float, ...]:
+        return message.vector.x, message.vector.y, message.vector.z

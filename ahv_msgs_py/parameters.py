@@ -1,0 +1,61 @@
+"""Parameters of the nodes: name, unit, range and meaning, checked alike with and without ROS."""
+
+from collections.abc import Iterable, Mapping
+from math import isfinite
+from typing import NamedTuple
+
+Value = bool | int | float | str
+
+
+class ParameterError(ValueError):
+    """A parameter that cannot be flown with; the message names it, its value and what is valid."""
+
+
+class Parameter(NamedTuple):
+    """One parameter; its type is that of its default, its range is inclusive."""
+
+    name: str
+    default: Value
+    description: str
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+
+    @property
+    def valid(self) -> str:
+        """What is valid, in words."""
+        kind = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}
+        words = kind[type(self.default)]
+        if self.minimum is not None:
+            words += f" from {self.minimum:g} to {self.maximum:g}"
+        return f"{words} {self.unit}".rstrip()
+
+    def check(self, node: str, value: object) -> Value:
+        """`value` in the type of the parameter, or ParameterError."""
+        wanted = type(self.default)
+        if wanted is float and type(value) is int:
+            value = float(value)
+        fits = isinstance(value, wanted) and type(value) is wanted
+        if fits and isinstance(value, int | float) and not isinstance(value, bool):
+            fits = isfinite(value)
+            if self.minimum is not None and self.maximum is not None:
+                fits = fits and self.minimum <= value <= self.maximum
+        if not fits or not isinstance(value, bool | int | float | str):
+            raise ParameterError(f"{node}: {self.name} is {value!r}, but must be {self.valid}")
+        return value
+
+
+def check_parameters(
+    node: str, parameters: Iterable[Parameter], values: Mapping[str, object]
+) -> dict[str, Value]:
+    """Values of all `parameters`, the defaults where `values` has none; ParameterError otherwise."""
+    known = {parameter.name: parameter for parameter in parameters}
+    for name in values:
+        if name not in known:
+            raise ParameterError(
+                f"{node}: there is no parameter {name!r}; valid are {', '.join(known)}"
+            )
+    return {
+        name: parameter.check(node, values.get(name, parameter.default))
+        for name, parameter in known.items()
+    }

@@ -1,0 +1,57 @@
+"""International Standard Atmosphere, 0 to 47 km geopotential altitude (ISO 2533:1975).
+
+The report's trim fits the table entered with h as geopotential altitude, so that is the default;
+`geometric` converts a geometric altitude first.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+from ahv_plant.compiled import elementwise
+from ahv_plant.elementary import exp_small, log_near_one
+from ahv_plant.state import clamp
+
+GAS_CONSTANT = 287.05287  # [J/(kg K)] of dry air
+STANDARD_GRAVITY = 9.80665  # [m/s^2]
+HEAT_RATIO = 1.4  # [-]
+EARTH_RADIUS = 6_356_766.0  # [m] nominal, for geopotential altitude
+ALTITUDE_MINIMUM = 0.0  # [m] geopotential
+ALTITUDE_MAXIMUM = 47_000.0  # [m] geopotential
+
+# Layer bases: altitude [m], temperature [K], lapse rate [K/m], pressure [Pa].
+H1, T1, LAPSE1, P1 = 0.0, 288.15, -0.0065, 101325.0
+H2, T2, LAPSE2, P2 = 11_000.0, 216.65, 0.0, 22632.04009500781
+H3, T3, LAPSE3, P3 = 20_000.0, 216.65, 0.001, 5474.8774242810505
+H4, T4, LAPSE4, P4 = 32_000.0, 228.65, 0.0028, 868.015776620216
+
+
+class Air(NamedTuple):
+    """The air at an altitude."""
+
+    temperature: float  # [K]
+    pressure: float  # [Pa]
+    density: float  # [kg/m^3] rho
+    sound_speed: float  # [m/s] a
+
+
+@elementwise
+def geopotential_altitude(h: float, geometric: bool) -> float:
+    """Geopotential altitude [m] of `h` [m], which is geometric or already geopotential."""
+    return h * EARTH_RADIUS / (EARTH_RADIUS + h) if geometric else h
+
+
+@elementwise
+def atmosphere(h: float, geometric: bool) -> Air:
+    """The standard air at altitude `h` [m]; beyond 0 to 47 km it stays as at the edge."""
+    H = clamp(geopotential_altitude(h, geometric), ALTITUDE_MINIMUM, ALTITUDE_MAXIMUM)
+    above1, above2, above3 = H > H2, H > H3, H > H4
+    base = H4 if above3 else (H3 if above2 else (H2 if above1 else H1))
+    T_base = T4 if above3 else (T3 if above2 else (T2 if above1 else T1))
+    p_base = P4 if above3 else (P3 if above2 else (P2 if above1 else P1))
+    lapse = LAPSE4 if above3 else (LAPSE3 if above2 else (LAPSE2 if above1 else LAPSE1))
+    isothermal = lapse == 0.0
+    T = T_base + lapse * (H - base)
+    power = -STANDARD_GRAVITY / (GAS_CONSTANT * (1.0 if isothermal else lapse))
+    fall = -STANDARD_GRAVITY / (GAS_CONSTANT * T_base) * (H - base)
+    p = p_base * exp_small(fall if isothermal else power * log_near_one(T / T_base))
+    return Air(T, p, p / (GAS_CONSTANT * T), sqrt(HEAT_RATIO * GAS_CONSTANT * T))

@@ -1,0 +1,60 @@
+"""One source, three ways to run it: plain floats, compiled scalars, and lanes of a vector loop.
+
+A function marked `elementwise` takes and returns floats or named tuples of floats, and uses only
++ - * / sqrt, comparisons and selects, which IEEE 754 rounds alike everywhere. Fastmath is off, so no
+operation is contracted or reordered, and all three ways give the same bits. The environment variable
+NUMBA_DISABLE_JIT=1 runs the very same source as plain Python.
+"""
+
+import hashlib
+import os
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core import config
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def _source_hash() -> str:
+    """Hash the sources of all compiled code.
+
+    Numba looks only at the file of the function that it caches; a callee changed in another file
+    would go on with its old machine code.
+    """
+    house = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for room in ("ahv_plant", "ahv_control"):
+        for source in sorted((house / room).glob("*.py")):
+            digest.update(source.name.encode() + source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_directory() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "ahv" / _source_hash()
+
+
+_CACHE = _cache_directory()
+
+
+@contextmanager
+def _numba_cache_in(directory: Path):
+    """Point numba at `directory` while one function sets up its cache, and nobody else's."""
+    before, config.CACHE_DIR = config.CACHE_DIR, str(directory)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+def elementwise(function: Function) -> Function:
+    """Compile `function` of scalars with IEEE division and a cache that notices any changed source."""
+    dispatcher = numba.njit(function, error_model="numpy")
+    if not config.DISABLE_JIT:
+        with _numba_cache_in(_CACHE):
+            dispatcher.enable_caching()
+    return dispatcher

@@ -1,0 +1,34 @@
+"""When a flight is over because the model no longer describes the vehicle."""
+
+from enum import IntEnum
+
+from ahv_plant.atmosphere import ALTITUDE_MAXIMUM, ALTITUDE_MINIMUM, geopotential_altitude
+from ahv_plant.compiled import elementwise
+from ahv_plant.state import State
+
+
+class Departure(IntEnum):
+    """Why the flight cannot go on."""
+
+    NONE = 0
+    STATE_IS_NOT_FINITE = 1
+    LEFT_THE_ATMOSPHERE_MODEL = 2  # above 47 km or below 0
+
+
+@elementwise
+def departure(state: State, geometric: bool) -> int:
+    """Departure of a state, as a plain number."""
+    H = geopotential_altitude(state.h, geometric)
+    total = state.u + state.v + state.w + state.P + state.Q + state.R
+    total = total + state.phi + state.theta + state.psi + state.x + state.y + H + state.mass
+    finite = total - total == 0.0
+    inside = H >= ALTITUDE_MINIMUM and H <= ALTITUDE_MAXIMUM
+    return (0 if inside else 2) if finite else 1
+
+
+def departure_reason(state: State, geometric: bool, time: float) -> str:
+    """Why the flight ends with `state` at `time` [s], in words; empty if it does not."""
+    left = Departure(departure(state, geometric))
+    if left == Departure.NONE:
+        return ""
+    return f"{left.name.lower().replace('_', ' ')} at {time:g} s"

@@ -1,0 +1,60 @@
+"""Parameters of the plant node: start, duration, and what the air and the graph are like."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ahv_msgs_py.parameters import Parameter, ParameterError, Value
+from ahv_plant.constants import INITIAL_MASS, RADIANS, STEP
+from ahv_plant.mass_properties import MASS_MAXIMUM, MASS_MINIMUM
+from ahv_plant.state import State
+from ahv_plant.trim import check_flight_condition
+
+GEOMETRIC_ALTITUDE = Parameter(
+    "geometric_altitude", False, "h is geometric altitude; if false, geopotential as in the report"
+)
+
+PLANT_PARAMETERS = (
+    Parameter("duration", 150.0, "length of the flight", "s", STEP, 3600.0),
+    Parameter("initial.u", 1786.4, "body velocity forward", "m/s", 0.0, 8000.0),
+    Parameter("initial.v", 0.0, "body velocity right", "m/s", -500.0, 500.0),
+    Parameter("initial.w", 91.8, "body velocity down", "m/s", -500.0, 500.0),
+    Parameter("initial.P", 0.0, "roll rate", "deg/s", -90.0, 90.0),
+    Parameter("initial.Q", 0.0, "pitch rate", "deg/s", -90.0, 90.0),
+    Parameter("initial.R", 0.0, "yaw rate", "deg/s", -90.0, 90.0),
+    Parameter("initial.phi", 0.0, "roll angle", "deg", -180.0, 180.0),
+    Parameter("initial.theta", 2.94, "pitch angle", "deg", -89.0, 89.0),
+    Parameter("initial.psi", 0.0, "yaw angle", "deg", -180.0, 180.0),
+    Parameter("initial.x", 0.0, "distance north", "m", -1e7, 1e7),
+    Parameter("initial.y", 0.0, "distance east", "m", -1e7, 1e7),
+    Parameter("initial.h", 24000.0, "altitude", "m", 0.0, 48000.0),
+    Parameter("initial.mass", INITIAL_MASS, "mass", "kg", MASS_MINIMUM, MASS_MAXIMUM),
+    GEOMETRIC_ALTITUDE,
+    Parameter(
+        "listeners", 3, "subscribers of the state to wait for before the first step", "", 1, 100
+    ),
+)
+
+
+class PlantSettings(NamedTuple):
+    """What the plant flies: in SI units."""
+
+    initial: State
+    steps: int  # number of integration steps of 0.01 s
+    geometric: bool  # h is a geometric altitude
+
+
+def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
+    """Settings from checked parameters; ParameterError where the model does not hold."""
+    degrees = ("P", "Q", "R", "phi", "theta", "psi")
+    initial = State(
+        **{
+            name: float(values[f"initial.{name}"]) * (RADIANS if name in degrees else 1.0)
+            for name in State._fields
+        }
+    )
+    geometric = bool(values["geometric_altitude"])
+    try:
+        check_flight_condition(initial.h, initial.u, initial.mass, geometric)
+    except ValueError as error:
+        raise ParameterError(f"plant: initial {error}") from error
+    return PlantSettings(initial, round(float(values["duration"]) / STEP), geometric)

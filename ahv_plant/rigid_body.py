@@ -1,0 +1,52 @@
+"""Rigid-body equations of motion over a flat Earth (eqs 2.1, 2.3-2.5, as corrected in docs/errata.md)."""
+
+from ahv_plant.aerodynamics import Loads
+from ahv_plant.compiled import elementwise
+from ahv_plant.constants import GRAVITY
+from ahv_plant.elementary import sin_cos
+from ahv_plant.mass_properties import Inertia
+from ahv_plant.state import State
+
+
+@elementwise
+def angular_acceleration(
+    P: float, Q: float, R: float, L: float, M: float, N: float, body: Inertia
+) -> tuple[float, float, float]:
+    """Rates of P, Q, R [rad/s^2] under the moments L, M, N [N m], eq 2.3.
+
+    With I_xz = 0, c2 = c4 = c6 = 0 and the others are the quotients below.
+    """
+    c1 = (body.Iyy - body.Izz) / body.Ixx
+    c5 = (body.Izz - body.Ixx) / body.Iyy
+    c8 = (body.Ixx - body.Iyy) / body.Izz
+    return c1 * Q * R + L / body.Ixx, c5 * P * R + M / body.Iyy, c8 * P * Q + N / body.Izz
+
+
+@elementwise
+def motion(state: State, total: Loads, mass_rate: float, body: Inertia) -> State:
+    """Rates of all states [units of the state per s] under the total loads, eqs 2.1 and 2.3-2.6."""
+    u, v, w = state.u, state.v, state.w
+    P, Q, R = state.P, state.Q, state.R
+    sin_phi, cos_phi = sin_cos(state.phi)
+    sin_theta, cos_theta = sin_cos(state.theta)
+    sin_psi, cos_psi = sin_cos(state.psi)
+    P_dot, Q_dot, R_dot = angular_acceleration(P, Q, R, total.L, total.M, total.N, body)
+    psi_dot = (Q * sin_phi + R * cos_phi) / cos_theta
+    down = v * sin_phi + w * cos_phi  # velocity along the vertical plane's normal to u
+    across = v * cos_phi - w * sin_phi
+    ahead = u * cos_theta + down * sin_theta
+    return State(
+        R * v - Q * w - GRAVITY * sin_theta + total.Fx / state.mass,
+        P * w - R * u + GRAVITY * cos_theta * sin_phi + total.Fy / state.mass,
+        Q * u - P * v + GRAVITY * cos_theta * cos_phi + total.Fz / state.mass,
+        P_dot,
+        Q_dot,
+        R_dot,
+        P + psi_dot * sin_theta,
+        Q * cos_phi - R * sin_phi,
+        psi_dot,
+        ahead * cos_psi - across * sin_psi,
+        ahead * sin_psi + across * cos_psi,
+        u * sin_theta - down * cos_theta,
+        mass_rate,
+    )

@@ -1,0 +1,52 @@
+"""The vehicle: its equations of motion under held controls, and one Runge-Kutta step of them."""
+
+from ahv_plant.aerodynamics import Loads, aerodynamic_coefficients, air_data, loads
+from ahv_plant.compiled import elementwise
+from ahv_plant.constants import GRAVITY, MAXIMUM_THRUST, SPECIFIC_IMPULSE, STEP
+from ahv_plant.mass_properties import centre_of_gravity, inertia
+from ahv_plant.rigid_body import motion
+from ahv_plant.state import State, Surfaces, limit_surfaces, limit_throttle
+
+
+@elementwise
+def state_rate(state: State, surfaces: Surfaces, throttle: float, geometric: bool) -> State:
+    """Rates of the 13 states, eqs 2.1-2.14, with the surfaces [rad] and sigma_T [-] as they are."""
+    air = air_data(state, geometric)
+    coefficients = aerodynamic_coefficients(air, state, surfaces)
+    aero = loads(air, coefficients, centre_of_gravity(state.mass))
+    total = Loads(aero.Fx + throttle * MAXIMUM_THRUST, aero.Fy, aero.Fz, aero.L, aero.M, aero.N)
+    mass_rate = -throttle * MAXIMUM_THRUST / (SPECIFIC_IMPULSE * GRAVITY)  # eq 2.6
+    return motion(state, total, mass_rate, inertia(state.mass))
+
+
+@elementwise
+def along(state: State, rate: State, time: float) -> State:
+    """The state moved along its rate for `time` [s]."""
+    return State(
+        state.u + time * rate.u,
+        state.v + time * rate.v,
+        state.w + time * rate.w,
+        state.P + time * rate.P,
+        state.Q + time * rate.Q,
+        state.R + time * rate.R,
+        state.phi + time * rate.phi,
+        state.theta + time * rate.theta,
+        state.psi + time * rate.psi,
+        state.x + time * rate.x,
+        state.y + time * rate.y,
+        state.h + time * rate.h,
+        state.mass + time * rate.mass,
+    )
+
+
+@elementwise
+def vehicle_step(state: State, surfaces: Surfaces, throttle: float, geometric: bool) -> State:
+    """The state 0.01 s later: fourth-order Runge-Kutta with held controls, limited to their stops."""
+    held = limit_surfaces(surfaces)
+    power = limit_throttle(throttle)
+    k1 = state_rate(state, held, power, geometric)
+    k2 = state_rate(along(state, k1, 0.5 * STEP), held, power, geometric)
+    k3 = state_rate(along(state, k2, 0.5 * STEP), held, power, geometric)
+    k4 = state_rate(along(state, k3, STEP), held, power, geometric)
+    ends = along(along(state, k1, STEP / 6.0), k4, STEP / 6.0)
+    return along(along(ends, k2, STEP / 3.0), k3, STEP / 3.0)
