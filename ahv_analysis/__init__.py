@@ -1,0 +1,1 @@
+"""What happens around a flight: engines, bags, figures, the `ahv` command."""

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from rosbags.interfaces import Connection
+from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
-from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag_writer import NOTES, BagError
 from ahv_analysis.record import FlightRecord
+from ahv_msgs_py.base_node import message_class
 from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
@@ -64,17 +64,17 @@ def _series(reader: Reader, topic: LoopTopic) -> dict[int, tuple[float, ...]]:
         if (connection.topic, connection.msgtype) == (topic.name, topic.layout.type_name)
     ]
     return dict(
-        topic.layout.decode(data) or _general(topic, connection, data)
-        for connection, _, data in reader.messages(connections)
+        topic.layout.decode(data) or _general(topic, data)
+        for _, _, data in reader.messages(connections)
     )
 
 
-def _general(
-    topic: LoopTopic, connection: Connection, data: bytes
-) -> tuple[int, tuple[float, ...]]:
-    """Read a message of another sender, whose layout is not the usual one."""
-    message = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, connection.msgtype)
-    return topic.layout.values_of(message)
+def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:
+    """Read a message of another sender, whose layout is not the usual one.
+
+    By rclpy and not by rosbags, which refuses the surplus bytes that rclpy leaves behind the end.
+    """
+    return topic.layout.values_of(deserialize_message(data, message_class(topic.layout.type_name)))
 
 
 def _geometric(path: Path) -> bool:

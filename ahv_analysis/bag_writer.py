@@ -49,7 +49,8 @@ class BagWriter:
     def __init__(self, path: Path, notes: str = ""):
         """Create the bag folder `path`; BagError if it exists or cannot be made.
 
-        `notes` are filed with the bag; `ahv fly` writes the parameters of the flight there as JSON.
+        `notes` are filed with the bag; `ahv fly` writes the parameters of the flight there as
+        JSON.
         """
         self.path = path
         self.counts: dict[str, int] = {}

@@ -93,7 +93,7 @@ def load_case(name: str, duration: float | None = None) -> Case:
 
 
 def _read(path: Path) -> dict[str, dict[str, object]]:
-    """Parameters per node as the file gives them, those of `/**` handed to the nodes that know them."""
+    """Parameters per node as the file gives them, those of `/**` given to all that know them."""
     try:
         content = yaml.safe_load(path.read_text())
     except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:

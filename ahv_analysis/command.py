@@ -5,7 +5,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from enum import Enum
+from enum import StrEnum
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,11 +31,23 @@ console = Console()
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
-class Engine(str, Enum):
+class Engine(StrEnum):
     """What flies a case."""
 
     graph = "graph"
     library = "library"
+
+
+def number(text: str) -> float:
+    """Read an option that is a number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not a number") from None
+
+
+def _number(unit: str, meaning: str) -> Any:
+    return typer.Option(help=f"{meaning} [{unit}].", parser=number, metavar="NUMBER")
 
 
 class UsageError(Exception):
@@ -78,9 +90,9 @@ def table(title: str, rows: list[tuple[str, str]]) -> None:
 @app.command()
 @one_sentence
 def trim(
-    altitude: Annotated[float, typer.Option(help="Altitude [m].")] = CRUISE_ALTITUDE,
-    speed: Annotated[float, typer.Option(help="Forward speed u [m/s].")] = CRUISE_SPEED,
-    mass: Annotated[float, typer.Option(help="Mass [kg].")] = INITIAL_MASS,
+    altitude: Annotated[float, _number("m", "Altitude")] = CRUISE_ALTITUDE,
+    speed: Annotated[float, _number("m/s", "Forward speed u")] = CRUISE_SPEED,
+    mass: Annotated[float, _number("kg", "Mass")] = INITIAL_MASS,
     geometric: Annotated[
         bool, typer.Option("--geometric", help="The altitude is geometric, not geopotential.")
     ] = False,
@@ -132,7 +144,7 @@ def fly(
         typer.Option(help="Folder for the bag and the summary, which must not have them."),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Length of the flight [s], instead of the case's.")
+        float | None, _number("s", "Length of the flight, instead of the case's")
     ] = None,
     as_json: Json = False,
 ) -> None:

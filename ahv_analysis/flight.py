@@ -1,4 +1,4 @@
-"""A flight in this process, without ROS: the same laws and the same vehicle, composed the same way."""
+"""A flight in this process, without ROS: the same laws and vehicle, composed the same way."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -32,7 +32,7 @@ class Step(NamedTuple):
 
 
 def fly(case: Case) -> Iterator[Step]:
-    """Fly `case`: its steps 0 to N, or fewer if the vehicle departs from what the model describes."""
+    """Fly `case`: its steps 0 to N, or fewer if the vehicle departs from the model."""
     state = case.plant.initial
     surfaces = NEUTRAL
     for step in range(case.plant.steps + 1):
@@ -49,8 +49,8 @@ def fly_library(
 ) -> tuple[str, float]:
     """Fly `case` and record it to the bag `path`, as `fly_graph` does.
 
-    `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did not)
-    and the seconds that it took.
+    `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did
+    not) and the seconds that it took.
     """
     bag = BagWriter(path, notes(case))
     started = time.perf_counter()

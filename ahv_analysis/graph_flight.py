@@ -34,9 +34,9 @@ def fly_graph(
 ) -> tuple[str, float]:
     """Fly `case` on a graph of its own context; record to `bag` unless that is None.
 
-    `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did not)
-    and the seconds from the first state to the last command. Raises ParameterError for settings that
-    a node refuses and GraphError if the graph stops.
+    `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did
+    not) and the seconds from the first state to the last command. Raises ParameterError for
+    settings that a node refuses and GraphError if the graph stops.
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = rclpy.Context()

@@ -37,7 +37,7 @@ class RecorderNode(BaseNode):
             try:
                 message_type = message_class(type_name)
             except ModuleNotFoundError:
-                continue  # /tf where tf2_msgs is not installed: then nobody here can send it either
+                continue  # /tf without tf2_msgs installed: then nobody here can send it either
             write = partial(self._bag.write, name)
             self.create_subscription(message_type, name, write, quality, raw=True)
         self.report(0, OK, f"recording to {self._bag.path}")

@@ -10,7 +10,7 @@ from ahv_plant.state import State
 
 
 def summarize(record: FlightRecord, ended_early: str) -> dict[str, Any]:
-    """Verdict, extremes and end of a flight; `ended_early` says why it ended before its time, or is empty.
+    """Verdict, extremes and end of a flight; `ended_early` says why it ended too soon, if so.
 
     Success is Table 5.1's: flown to the end with |alpha| <= 5 deg throughout (inlet unstart).
     """

@@ -1,0 +1,1 @@
+"""The flight software: pure laws, and one node each."""

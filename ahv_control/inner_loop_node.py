@@ -15,7 +15,7 @@ from ahv_plant.state import State
 
 
 class InnerLoopNode(BaseNode):
-    """Answers every state and its rate command with a surface command; reports the solver's status."""
+    """Answers every state and its rate command with a surface command."""
 
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None

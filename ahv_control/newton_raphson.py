@@ -18,11 +18,11 @@ from ahv_plant.mass_properties import Inertia, centre_of_gravity, inertia
 from ahv_plant.rigid_body import angular_acceleration
 from ahv_plant.state import State, Surfaces, limit_surfaces
 
-# A determinant below this [1/s^6] means that the surfaces have lost the vehicle; at cruise it is 0.1.
+# A determinant below this [1/s^6] means that the surfaces have lost the vehicle.
 SINGULAR_DETERMINANT = 1e-9
 # The surfaces are a solution when the last correction [rad] was smaller than this: convergence is
-# quadratic, so that the error left is of the order of its square.
-CORRECTION_TOLERANCE = 1e-6
+# quadratic, so that the error left is of the order of its square, 1e-10 rad.
+CORRECTION_TOLERANCE = 1e-5
 
 
 class SolverStatus(IntEnum):
@@ -76,7 +76,7 @@ def flight_condition(state: State, geometric: bool) -> FlightCondition:
 def angular_response(
     condition: FlightCondition, surfaces: Surfaces
 ) -> tuple[Rates, Rates, Rates, Rates]:
-    """f(X, U) of eq 2.3 [rad/s^2] and its slopes by right elevon, left elevon and rudder [1/s^2]."""
+    """f(X, U) of eq 2.3 [rad/s^2]; its slopes by right elevon, left elevon and rudder [1/s^2]."""
     air, body, rates = condition.air, condition.body, condition.rates
     increments, by_right, by_left, by_rudder = control_coefficients(air, surfaces)
     total = loads(air, add_coefficients(condition.clean, increments), condition.X_cg)

@@ -1,4 +1,4 @@
-"""Parameters of the controller nodes, and the settings made of them. Defaults are those of section 3.5.2."""
+"""Parameters of the controller nodes, by default those of section 3.5.2, and their settings."""
 
 from collections.abc import Mapping
 

@@ -1,0 +1,1 @@
+"""What crosses a topic: layouts, names, quality of service, parameters."""

@@ -1,4 +1,4 @@
-"""The shell that all nodes share: parameters, topics as exact bytes, diagnostics, start and end."""
+"""The shell that all nodes share: parameters, topics as exact bytes, diagnostics, start, end."""
 
 import os
 import signal
@@ -42,7 +42,7 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 
 
 def message_class(type_name: str) -> Any:
-    """Class of a message type like `sensor_msgs/msg/JointState`; ModuleNotFoundError if not installed."""
+    """Class of a message type like `sensor_msgs/msg/JointState`; ModuleNotFoundError if none."""
     package, _, name = type_name.split("/")
     return getattr(import_module(f"{package}.msg"), name)
 

@@ -1,9 +1,10 @@
 """Messages of fixed layout as bytes: what crosses a topic, exactly, at a fifth of the usual cost.
 
-A message whose frame and names are constant has a constant layout in CDR (little-endian, OMG DDS-XTypes
-7.4.3, version 1). A layout writes and reads such messages with one `struct` call. Every double keeps
-all its bits. The types stay ordinary ROS types, so that any tool reads them; a message of another
-sender with another layout is read the general way, by `values_of` its deserialized object.
+A message whose frame and names are constant has a constant layout in CDR (little-endian, OMG
+DDS-XTypes 7.4.3, version 1). A layout writes and reads such messages with one `struct` call. Every
+double keeps all its bits. The types stay ordinary ROS types, so that any tool reads them; a
+message of another sender with another layout is read the general way, by `values_of` its
+deserialized object.
 """
 
 from collections.abc import Sequence
@@ -38,7 +39,7 @@ class Layout:
     def __init__(
         self, type_name: str, frame: str, fields: Sequence[str], middle: bytes, end: bytes
     ):
-        """`middle` lies between frame and first double (padding left out), `end` after the last."""
+        """`middle` lies between frame and first double (less padding), `end` after the last."""
         self.type_name = type_name
         self.frame = frame
         self.fields = tuple(fields)
@@ -65,7 +66,7 @@ class Layout:
         return seconds * NANOSECONDS + nanoseconds, tuple(values)
 
     def values_of(self, message: Any) -> tuple[int, tuple[float, ...]]:
-        """Stamp [ns] and values of a message object of this type; MessageError if they do not fit."""
+        """Stamp [ns] and values of a message object of this type; MessageError if unfit."""
         stamp = message.header.stamp
         return stamp.sec * NANOSECONDS + stamp.nanosec, self._read(message)
 

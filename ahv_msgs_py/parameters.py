@@ -48,7 +48,7 @@ class Parameter(NamedTuple):
 def check_parameters(
     node: str, parameters: Iterable[Parameter], values: Mapping[str, object]
 ) -> dict[str, Value]:
-    """Values of all `parameters`, the defaults where `values` has none; ParameterError otherwise."""
+    """Values of all `parameters`, the defaults where `values` has none; else ParameterError."""
     known = {parameter.name: parameter for parameter in parameters}
     for name in values:
         if name not in known:

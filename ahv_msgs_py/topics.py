@@ -1,9 +1,10 @@
 """The topics of the graph: names, message types, layouts, units and frames.
 
-Frames: `base_link_frd` are body axes forward-right-down, `map_ned` is the flat Earth north-east-down
-(REP-103 suffixes). Quality of service, the same for all: reliable, transient local, keep last 100. Every
-answer carries the stamp of the state that it answers; transient local gives a node that joins late
-the state that it has to answer, so that no order of starting can lose a step.
+Frames: `base_link_frd` are body axes forward-right-down, `map_ned` is the flat Earth
+north-east-down (REP-103 suffixes). Quality of service, the same for all: reliable, transient
+local, keep last 100. Every answer carries the stamp of the state that it answers; transient local
+gives a node that joins late the state that it has to answer, so that no order of starting can lose
+a step.
 """
 
 from typing import NamedTuple

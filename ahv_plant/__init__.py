@@ -1,0 +1,1 @@
+"""The vehicle: pure physics, and the node that flies it."""

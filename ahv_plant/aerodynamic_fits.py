@@ -1,9 +1,9 @@
 """The 22 aerodynamic polynomials of the winged-cone vehicle, in Horner form.
 
 Fits by Keshmiri, Colgren and Mirmirani (2005), which the report cites in section 2.2 and does not
-print. Arguments: `a` angle of attack [deg], `m` Mach number [-], `d` deflection [deg]. Local names:
-`c2` multiplies a^2, `d1` multiplies d^1, `m2` is m^2. Control-surface polynomials return their value
-and their slope by d [1/deg]. The fits hold above Mach 4. The figures are those of
+print. Arguments: `a` angle of attack [deg], `m` Mach number [-], `d` deflection [deg]. Local
+names: `c2` multiplies a^2, `d1` multiplies d^1, `m2` is m^2. Control-surface polynomials return
+their value and their slope by d [1/deg]. The fits hold above Mach 4. The figures are those of
 test/data/aero_coefficients.csv; a test compares them term by term.
 """
 
@@ -75,7 +75,7 @@ def CY_beta(a: float, m: float) -> float:
 
 @elementwise
 def CY_elevon(a: float, m: float, d: float) -> tuple[float, float]:
-    """Side force of the right elevon at d [deg] and its slope, C_Y,de; the left one is opposite."""
+    """Side force of the right elevon at d [deg], and slope, C_Y,de; the left one is opposite."""
     a2 = a * a
     m2 = m * m
     d0 = -1.02e-06 + m * (4.48e-07 + m * -2.36e-08) + a * (-1.12e-07 + a * 2.82e-09)
@@ -106,7 +106,7 @@ def Cl_beta(a: float, m: float) -> float:
 
 @elementwise
 def Cl_elevon(a: float, m: float, d: float) -> tuple[float, float]:
-    """Rolling moment of the right elevon at d [deg] and its slope, C_l,de; the left one is opposite."""
+    """Rolling moment of the right elevon at d, and slope, C_l,de; the left one is opposite."""
     a2 = a * a
     m2 = m * m
     d0 = 0.000357 + m * (-3.598e-05 + m * 1.411e-06) + a * (-9.569e-05 + a * 4.95e-06)
@@ -207,7 +207,7 @@ def Cn_beta(a: float, m: float) -> float:
 
 @elementwise
 def Cn_elevon(a: float, m: float, d: float) -> tuple[float, float]:
-    """Yawing moment of the right elevon at d [deg] and its slope, C_n,de; the left one is opposite."""
+    """Yawing moment of the right elevon at d, and slope, C_n,de; the left one is opposite."""
     a2 = a * a
     m2 = m * m
     d0 = 0.00021 + m * (-3.56e-05 + m * 8.16e-07) + a * (1.83e-05 + a * -6.39e-07)

@@ -89,7 +89,7 @@ def air_data(state: State, geometric: bool) -> AirData:
 
 @elementwise
 def clean_coefficients(air: AirData, state: State) -> Coefficients:
-    """Return the part of the coefficients that no control surface changes: basic, sideslip and damping."""
+    """Return what no surface changes of the coefficients: basic, sideslip and damping parts."""
     a = air.alpha * DEGREES
     m = air.mach
     p_hat = state.P * WING_SPAN / (2.0 * air.speed)
@@ -109,7 +109,7 @@ def clean_coefficients(air: AirData, state: State) -> Coefficients:
 def control_coefficients(
     air: AirData, surfaces: Surfaces
 ) -> tuple[Coefficients, Coefficients, Coefficients, Coefficients]:
-    """Increments of the coefficients due to the surfaces, and their slopes by each surface [1/rad].
+    """Increments of the coefficients due to the surfaces, their slopes by each surface [1/rad].
 
     The order of the slopes is right elevon (delta_e), left elevon (delta_a), rudder (delta_r). The
     right elevon's roll, yaw and side force count positive, the left one's negative.

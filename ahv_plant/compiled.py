@@ -1,9 +1,9 @@
 """One source, three ways to run it: plain floats, compiled scalars, and lanes of a vector loop.
 
-A function marked `elementwise` takes and returns floats or named tuples of floats, and uses only
-+ - * / sqrt, comparisons and selects, which IEEE 754 rounds alike everywhere. Fastmath is off, so no
-operation is contracted or reordered, and all three ways give the same bits. The environment variable
-NUMBA_DISABLE_JIT=1 runs the very same source as plain Python.
+A function marked `elementwise` takes and returns floats or named tuples of floats, and uses only +
+- * / sqrt, comparisons and selects, which IEEE 754 rounds alike everywhere. Fastmath is off, so no
+operation is contracted or reordered, and all three ways give the same bits. The environment
+variable NUMBA_DISABLE_JIT=1 runs the very same source as plain Python.
 """
 
 import hashlib
@@ -52,7 +52,7 @@ def _numba_cache_in(directory: Path):
 
 
 def elementwise(function: Function) -> Function:
-    """Compile `function` of scalars with IEEE division and a cache that notices any changed source."""
+    """Compile `function` of scalars, with IEEE division and a cache that notices new sources."""
     dispatcher = numba.njit(function, error_model="numpy")
     if not config.DISABLE_JIT:
         with _numba_cache_in(_CACHE):

@@ -23,7 +23,7 @@ ROUNDER = 6755399441055744.0
 
 @elementwise
 def sin_cos(x: float) -> tuple[float, float]:
-    """Sine and cosine of x [rad], |x| < 1e6: quadrant by Cody-Waite reduction, then Taylor series."""
+    """Sine and cosine of x [rad], |x| < 1e6: Cody-Waite reduction, then Taylor series."""
     n = (x * TWO_OVER_PI + ROUNDER) - ROUNDER
     r = ((x - n * HALF_PI_1) - n * HALF_PI_2) - n * HALF_PI_3
     z = r * r
@@ -86,7 +86,7 @@ def log_near_one(x: float) -> float:
 
 @elementwise
 def exp_small(x: float) -> float:
-    """Exponential for |x| <= 3, the range of log pressure ratios: Taylor at x/16, then four squarings."""
+    """Exponential for |x| <= 3, all log pressure ratios: Taylor at x/16, then four squarings."""
     r = x * 0.0625
     tail = 1.0 / 5040.0 + r * (1.0 / 40320.0 + r * (1.0 / 362880.0 + r / 3628800.0))
     tail = 1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0 + r * tail))

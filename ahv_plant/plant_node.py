@@ -31,7 +31,7 @@ VIEWER_PERIOD = 10  # steps between messages for viewers: 10 Hz
 
 
 class PlantNode(BaseNode):
-    """Publishes state k at stamp k * 10 ms and integrates to k + 1 when both its commands are there.
+    """Publishes state k at stamp k * 10 ms; integrates to k + 1 when both its commands are there.
 
     `finished` holds the reason why the flight ended, which is empty when it was flown to its end.
     """

@@ -1,4 +1,4 @@
-"""Rigid-body equations of motion over a flat Earth (eqs 2.1, 2.3-2.5, as corrected in docs/errata.md)."""
+"""Rigid-body equations over a flat Earth (eqs 2.1, 2.3-2.5, corrected in docs/errata.md)."""
 
 from ahv_plant.aerodynamics import Loads
 from ahv_plant.compiled import elementwise
@@ -24,7 +24,7 @@ def angular_acceleration(
 
 @elementwise
 def motion(state: State, total: Loads, mass_rate: float, body: Inertia) -> State:
-    """Rates of all states [units of the state per s] under the total loads, eqs 2.1 and 2.3-2.6."""
+    """Rates of all states [their units per s] under the total loads, eqs 2.1 and 2.3-2.6."""
     u, v, w = state.u, state.v, state.w
     P, Q, R = state.P, state.Q, state.R
     sin_phi, cos_phi = sin_cos(state.phi)

@@ -14,7 +14,8 @@ from ahv_plant.constants import (
 class State(NamedTuple):
     """The 13 states of eqs 2.1-2.6; also used for their rates, in the same units per second.
 
-    Body axes are forward-right-down, the inertial frame is north-east-down on a flat Earth, h is up.
+    Body axes are forward-right-down, the inertial frame is north-east-down on a flat Earth, h is
+    up.
     """
 
     u: float  # [m/s] body velocity forward
@@ -33,7 +34,7 @@ class State(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """Deflections of the three control surfaces; positive trailing edge down, and left for the rudder."""
+    """Deflections of the three control surfaces; positive: trailing edge down, rudder left."""
 
     right_elevon: float  # [rad] delta_e
     left_elevon: float  # [rad] delta_a

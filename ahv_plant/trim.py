@@ -64,7 +64,7 @@ def trim(
     mass: float = INITIAL_MASS,
     geometric: bool = False,
 ) -> Trim:
-    """Level flight at `altitude` [m], forward speed u = `speed` [m/s] and `mass` [kg], section 3.5.1.
+    """Level flight at `altitude` [m], u = `speed` [m/s] and `mass` [kg], section 3.5.1.
 
     Solves the rates of u, v, w, P, Q, R and h for v, w, theta, the three surfaces and sigma_T, all
     other states being zero. Raises ValueError outside the range of the model.

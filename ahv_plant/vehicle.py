@@ -10,7 +10,7 @@ from ahv_plant.state import State, Surfaces, limit_surfaces, limit_throttle
 
 @elementwise
 def state_rate(state: State, surfaces: Surfaces, throttle: float, geometric: bool) -> State:
-    """Rates of the 13 states, eqs 2.1-2.14, with the surfaces [rad] and sigma_T [-] as they are."""
+    """Rates of the 13 states, eqs 2.1-2.14, with surfaces [rad] and sigma_T [-] as they are."""
     air = air_data(state, geometric)
     coefficients = aerodynamic_coefficients(air, state, surfaces)
     aero = loads(air, coefficients, centre_of_gravity(state.mass))
@@ -41,7 +41,7 @@ def along(state: State, rate: State, time: float) -> State:
 
 @elementwise
 def vehicle_step(state: State, surfaces: Surfaces, throttle: float, geometric: bool) -> State:
-    """The state 0.01 s later: fourth-order Runge-Kutta with held controls, limited to their stops."""
+    """The state 0.01 s later: fourth-order Runge-Kutta, controls held within their stops."""
     held = limit_surfaces(surfaces)
     power = limit_throttle(throttle)
     k1 = state_rate(state, held, power, geometric)

@@ -1,0 +1,19 @@
+"""What all tests share: a private ROS domain, repeatable random examples."""
+
+import itertools
+import os
+
+import pytest
+from hypothesis import settings
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+settings.register_profile("ahv", deadline=None, derandomize=True, print_blob=False)
+settings.load_profile("ahv")
+
+_domains = itertools.count(os.getpid())
+
+
+@pytest.fixture
+def domain():
+    """A ROS domain that no other test of this run uses (above 101 ports are not safe)."""
+    return 1 + next(_domains) % 100

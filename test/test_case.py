@@ -1,0 +1,83 @@
+"""A case file is a ROS parameter file; what is wrong with it is said in one sentence."""
+
+import pytest
+
+from ahv_analysis.case import case_names, config_folder, load_case
+from ahv_msgs_py.parameters import ParameterError
+from ahv_plant.constants import RADIANS
+
+NOMINAL = (config_folder() / "cases" / "nominal_di.yaml").read_text()
+
+
+def test_nominal_case_is_section_3_5_2():
+    case = load_case("nominal_di")
+    start = case.plant.initial
+    assert (start.u, start.v, start.w, start.h, start.mass) == (
+        1836.4,
+        0.0,
+        91.8,
+        24100.0,
+        136077.6,
+    )
+    assert (start.P, start.Q, start.R) == (3 * RADIANS, 2 * RADIANS, -3 * RADIANS)
+    assert (start.phi, start.theta, start.psi) == (0.0, 2.94 * RADIANS, 0.0)
+    assert case.plant.steps == 15000
+    assert case.control.outer == (24000.0, 0.01)
+    assert case.control.intermediate == (0.2, 0.2, 0.2)
+    assert case.control.inner == (2.0, 2.0, 2.0, False)
+    assert case.control.velocity == (1786.4, 0.01, False)
+
+
+@pytest.mark.parametrize("name", case_names())
+def test_every_case_of_the_package_loads(name):
+    assert load_case(name).name == name
+
+
+def test_duration_replaces_that_of_the_file():
+    assert load_case("nominal_di", duration=1.5).plant.steps == 150
+
+
+def test_shared_parameters_reach_every_node_that_knows_them(tmp_path):
+    path = tmp_path / "geometric.yaml"
+    path.write_text(NOMINAL.replace("geometric_altitude: false", "geometric_altitude: true"))
+    case = load_case(str(path))
+    assert (
+        case.plant.geometric and case.control.inner.geometric and case.control.velocity.geometric
+    )
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (("k_theta: 0.2", "k_theta: -0.2"), ("outer_intermediate", "k_theta", "-0.2", "0 to 50")),
+        (("k_theta: 0.2", "k_theta: fast"), ("k_theta", "'fast'", "a number")),
+        (("k_theta: 0.2", "k_thta: 0.2"), ("k_thta", "k_theta")),
+        (("k_u: 0.01", "k_u: .nan"), ("velocity", "k_u", "nan", "0 to 50")),
+        (("h: 24100.0", "h: 47500.0"), ("plant", "altitude", "47500", "0 to 47000 m")),
+        (("u: 1836.4", "u: 800.0"), ("plant", "speed", "800", "Mach 4 to 24")),
+        (("mass: 136077.6", "mass: 1.0"), ("initial.mass", "1.0", "60000 to 140000 kg")),
+        (("/ahv/velocity", "/ahv/speed"), ("/ahv/speed", "/ahv/velocity")),
+        (("geometric_altitude: false", "geometric: 1"), ("'geometric'",)),
+        (
+            ("geometric_altitude: false", "geometric_altitude: 1"),
+            ("geometric_altitude", "true or"),
+        ),
+        (("  ros__parameters:\n    k_P", "  parameters:\n    k_P"), ("/ahv/inner_loop", "ros__")),
+        (("/ahv/velocity:", "]["), ("not a readable YAML",)),
+    ],
+)
+def test_a_wrong_case_is_named(tmp_path, change, words):
+    path = tmp_path / "wrong.yaml"
+    assert change[0] in NOMINAL
+    path.write_text(NOMINAL.replace(*change))
+    with pytest.raises(ParameterError) as error:
+        load_case(str(path))
+    sentence = str(error.value)
+    assert "wrong.yaml" in sentence or "plant" in sentence
+    assert all(word in sentence for word in words), sentence
+    assert "\n" not in sentence
+
+
+def test_an_unknown_case_lists_the_known_ones():
+    with pytest.raises(ParameterError, match=r"'nope'.*nominal_di"):
+        load_case("nope")

@@ -1,0 +1,130 @@
+"""The `ahv` command: numbers as JSON, one sentence and exit code 2 for what cannot be."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from ahv_plant.state import State
+
+
+def ahv(*arguments, domain=100, cwd=None):
+    """Run the command as a process of its own."""
+    return subprocess.run(
+        [Path(sys.executable).parent / "ahv", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
+        timeout=120,
+    )
+
+
+def test_trim_as_json():
+    result = ahv("trim", "--json")
+    found = json.loads(result.stdout)
+    assert result.returncode == 0
+    assert found["w_mps"] == pytest.approx(91.878, abs=5e-4)
+    assert found["theta_deg"] == pytest.approx(2.9442, abs=5e-5)
+    assert found["right_elevon_deg"] == pytest.approx(-7.2163, abs=5e-5)
+    assert found["left_elevon_deg"] == pytest.approx(-7.2163, abs=5e-5)
+    assert found["throttle"] == pytest.approx(0.19417, abs=5e-6)
+    assert found["residual"] < 1e-9
+    assert found["converged"] is True
+    keys = "u_mps v_mps w_mps theta_deg alpha_deg right_elevon_deg left_elevon_deg rudder_deg"
+    assert set(keys.split()) | {"throttle", "residual", "converged"} <= set(found)
+
+
+def test_trim_as_a_table():
+    result = ahv("trim")
+    assert result.returncode == 0
+    assert "91.878" in result.stdout and "theta_deg" in result.stdout
+
+
+@pytest.fixture(scope="module", params=["graph", "library"])
+def flown(request, tmp_path_factory):
+    """Result of flying half a second and its folder."""
+    out = tmp_path_factory.mktemp("flown") / request.param
+    return (
+        request.param,
+        out,
+        ahv(
+            "fly",
+            "nominal_di",
+            "--engine",
+            request.param,
+            "--duration",
+            0.5,
+            "--out",
+            out,
+            "--json",
+        ),
+    )
+
+
+def test_fly_as_json(flown):
+    engine, out, result = flown
+    assert result.returncode == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert json.loads((out / "summary.json").read_text()) == summary
+    assert summary["case"] == "nominal_di"
+    assert summary["engine"] == engine
+    assert summary["steps"] == 50
+    assert summary["success"] is True
+    assert summary["bag"] == str(out / "bag") and (out / "bag" / "metadata.yaml").exists()
+    assert tuple(summary["final_state"]) == State._fields
+    assert summary["final_state"]["h"] == pytest.approx(24101, abs=1)
+    assert summary["max_abs_alpha_deg"] < 3.7 and summary["max_abs_beta_deg"] < 1.3
+    assert summary["wall_s"] > 0
+    assert summary["real_time_factor"] == pytest.approx(0.5 / summary["wall_s"])
+
+
+def test_figures_of_a_bag(flown, tmp_path):
+    _, out, _ = flown
+    result = ahv("figures", out / "bag", "--out", tmp_path, "--json")
+    assert result.returncode == 0, result.stderr
+    files = [Path(name) for name in json.loads(result.stdout)["figures"]]
+    names = {f"figure_3_{number}.{kind}" for number in range(2, 8) for kind in ("png", "svg")}
+    assert {file.name for file in files} == names
+    for file in files:
+        if file.suffix == ".png":
+            with Image.open(file) as image:
+                assert image.width > 800
+                assert len(image.convert("L").getcolors()) > 20  # not an empty sheet
+        else:
+            assert "</svg>" in file.read_text()
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (("trim", "--altitude", 1e5), ("altitude 100000 m", "0 to 47000 m")),
+        (("trim", "--speed", 100), ("speed 100 m/s", "1191 to 7147 m/s")),
+        (("trim", "--mass", "nan"), ("mass nan kg", "60000 to 140000 kg")),
+        (("fly", "nope"), ("case 'nope'", "nominal_di")),
+        (("fly", "nominal_di", "--duration", 0), ("duration", "0.01 to 3600 s")),
+        (("fly", "nominal_di", "--engine", "warp"), ("--engine", "warp", "graph")),
+        (("figures", "nothing", "--out", "x"), ("nothing is not a bag",)),
+        (("trim", "--altitude", "high"), ("--altitude", "high")),
+    ],
+)
+def test_wrong_input_is_named(arguments, words, tmp_path):
+    result = ahv(*arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    assert all(word in result.stderr for word in words), result.stderr
+    assert list(tmp_path.iterdir()) == []  # nothing was begun
+
+
+def test_a_flight_is_never_overwritten(flown):
+    _, out, _ = flown
+    before = (out / "summary.json").read_bytes()
+    result = ahv("fly", "nominal_di", "--duration", 0.1, "--out", out)
+    assert result.returncode == 2
+    assert f"{out / 'bag'} exists already" in result.stderr
+    assert (out / "summary.json").read_bytes() == before

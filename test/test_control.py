@@ -1,0 +1,144 @@
+"""Every loop inverts what it says it inverts."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from ahv_control.inner_loop import InnerLoop, surface_command
+from ahv_control.intermediate_loop import IntermediateLoop, Rates, rate_command
+from ahv_control.newton_raphson import (
+    SolverStatus,
+    angular_response,
+    flight_condition,
+    solve_surfaces,
+)
+from ahv_control.outer_loop import Attitude, OuterLoop, attitude_command
+from ahv_control.velocity_loop import VelocityLoop, throttle_command
+from ahv_plant.constants import (
+    DEGREES,
+    SURFACE_MAXIMUM,
+    SURFACE_MINIMUM,
+    THROTTLE_MAXIMUM,
+    THROTTLE_MINIMUM,
+)
+from ahv_plant.state import Surfaces
+from ahv_plant.vehicle import state_rate
+from test.flights import CRUISE, STATES, SURFACES, between, degrees
+
+NEUTRAL = Surfaces(0.0, 0.0, 0.0)
+
+
+@given(STATES, between(20000.0, 30000.0))
+def test_the_commanded_pitch_gives_the_commanded_climb(state, altitude):
+    """Eq 3.1 with the plus sign: at theta*, h_dot = k_h (h* - h)."""
+    command = attitude_command(state, OuterLoop(altitude, 0.01))
+    pitched = state._replace(theta=command.theta)
+    climb = state_rate(pitched, NEUTRAL, 0.2, False).h
+    assert climb == pytest.approx(0.01 * (altitude - state.h), abs=1e-8)
+    assert (command.phi, command.psi) == (0.0, 0.0)
+
+
+@given(STATES, degrees(30.0), degrees(30.0), degrees(30.0))
+def test_the_commanded_rates_give_the_commanded_euler_rates(state, phi, theta, psi):
+    gains = IntermediateLoop(0.1, 0.2, 0.3)
+    command = rate_command(state, Attitude(phi, theta, psi), gains)
+    turning = state._replace(P=command.P, Q=command.Q, R=command.R)
+    rate = state_rate(turning, NEUTRAL, 0.2, False)
+    expected = (0.1 * (phi - state.phi), 0.2 * (theta - state.theta), 0.3 * (psi - state.psi))
+    assert (rate.phi, rate.theta, rate.psi) == pytest.approx(expected, abs=1e-12)
+
+
+@given(STATES, SURFACES)
+def test_the_jacobian_is_the_complex_step_derivative(state, surfaces):
+    condition = flight_condition(state, False)
+    _, *slopes = angular_response(condition, surfaces)
+    for number, slope in enumerate(slopes):
+        stepped = [complex(value) for value in surfaces]
+        stepped[number] += 1e-30j
+        response, *_ = angular_response(condition, Surfaces(*stepped))
+        expected = [value.imag / 1e-30 for value in response]
+        assert slope == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
+@given(STATES, *[between(-0.02, 0.02)] * 3)
+def test_the_surfaces_give_the_demanded_acceleration(state, P_dot, Q_dot, R_dot):
+    demand = Rates(P_dot, Q_dot, R_dot)
+    solution = solve_surfaces(state, demand, Surfaces(-0.1, -0.1, 0.0), False)
+    assert all(SURFACE_MINIMUM <= value <= SURFACE_MAXIMUM for value in solution.surfaces)
+    if solution.status == SolverStatus.CONVERGED:
+        rate = state_rate(state, solution.surfaces, 0.2, False)
+        assert pytest.approx(demand, abs=1e-9) == (rate.P, rate.Q, rate.R)
+
+
+def test_the_solver_converges_in_ordinary_flight():
+    rolling = CRUISE._replace(P=0.05, Q=-0.03, R=0.05, v=30.0)
+    for state in (CRUISE, rolling):
+        solution = solve_surfaces(state, Rates(0.05, -0.02, 0.04), NEUTRAL, False)
+        assert solution.status == SolverStatus.CONVERGED
+
+
+def test_a_solution_beyond_a_stop_is_held_there_and_called_saturated():
+    solution = solve_surfaces(CRUISE, Rates(0.0, -1.0, 0.0), Surfaces(-0.1, -0.1, 0.0), False)
+    assert solution.status == SolverStatus.SATURATED
+    assert SURFACE_MAXIMUM in solution.surfaces or SURFACE_MINIMUM in solution.surfaces
+
+
+def test_without_air_the_jacobian_is_singular_and_the_surfaces_stay():
+    slow = CRUISE._replace(u=1.0, w=0.0)
+    previous = Surfaces(0.1, 0.2, 0.3)
+    solution = solve_surfaces(slow, Rates(0.1, 0.1, 0.1), previous, False)
+    assert solution == (previous, SolverStatus.SINGULAR)
+
+
+@pytest.mark.parametrize("field", ["u", "P", "h"])
+def test_not_a_number_leaves_the_surfaces_as_they_were(field):
+    previous = Surfaces(0.1, 0.2, 0.3)
+    broken = CRUISE._replace(**{field: math.nan})
+    solution = solve_surfaces(broken, Rates(0.0, 0.0, 0.0), previous, False)
+    assert solution.surfaces == previous
+    assert solution.status in (SolverStatus.SINGULAR, SolverStatus.ITERATION_LIMIT)
+
+
+@given(*[degrees(3.0)] * 6)
+def test_the_rate_error_decays_at_the_gains(P, Q, R, P_command, Q_command, R_command):
+    """Section 3.3 on the nominal vehicle: e_dot + K e = 0."""
+    state = CRUISE._replace(P=P, Q=Q, R=R)
+    command = Rates(P_command, Q_command, R_command)
+    gains = InnerLoop(1.0, 2.0, 1.5, False)
+    solution = surface_command(state, command, Surfaces(-0.1, -0.1, 0.0), gains)
+    assert solution.status == SolverStatus.CONVERGED
+    rate = state_rate(state, solution.surfaces, 0.2, False)
+    error = np.array(command) - (P, Q, R)
+    assert pytest.approx(np.array(gains[:3]) * error, abs=1e-9) == (rate.P, rate.Q, rate.R)
+
+
+@given(STATES, SURFACES, between(1700.0, 1900.0))
+def test_the_throttle_gives_the_commanded_acceleration(state, surfaces, speed):
+    """Eq 3.2: with sigma_T between its stops, u_dot = k_u (u* - u)."""
+    throttle = throttle_command(state, surfaces, VelocityLoop(speed, 0.01, False))
+    assert THROTTLE_MINIMUM <= throttle <= THROTTLE_MAXIMUM
+    rate = state_rate(state, surfaces, throttle, False).u
+    wanted = 0.01 * (speed - state.u)
+    if throttle == THROTTLE_MINIMUM:
+        assert rate > wanted - 1e-9
+    elif throttle == THROTTLE_MAXIMUM:
+        assert rate < wanted + 1e-9
+    else:
+        assert rate == pytest.approx(wanted, abs=1e-9)
+
+
+def test_at_trim_the_loops_ask_for_trim():
+    from ahv_plant.trim import trim
+
+    found = trim()
+    attitude = attitude_command(found.state, OuterLoop(24000.0, 0.01))
+    assert attitude.theta * DEGREES == pytest.approx(2.9442, abs=1e-4)
+    rates = rate_command(found.state, attitude, IntermediateLoop(0.2, 0.2, 0.2))
+    solution = surface_command(found.state, rates, found.surfaces, InnerLoop(2.0, 2.0, 2.0, False))
+    assert solution.surfaces == pytest.approx(found.surfaces, abs=1e-9)
+    throttle = throttle_command(
+        found.state, solution.surfaces, VelocityLoop(found.state.u, 0.01, False)
+    )
+    assert throttle == pytest.approx(found.throttle, abs=1e-9)

@@ -1,0 +1,82 @@
+"""Plain Python floats and compiled code give the same bits, by function and over a flight."""
+
+import os
+import subprocess
+import sys
+
+PROGRAM = """
+import hashlib
+import math
+import random
+
+from ahv_analysis.case import load_case
+from ahv_analysis.flight import fly
+from ahv_control.newton_raphson import angular_response, flight_condition, solve_surfaces
+from ahv_control.intermediate_loop import Rates
+from ahv_plant import aerodynamic_fits, elementary
+from ahv_plant.atmosphere import atmosphere
+from ahv_plant.state import State, Surfaces
+from ahv_plant.vehicle import state_rate, vehicle_step
+
+
+def flat(value):
+    if isinstance(value, tuple):
+        return [number for part in value for number in flat(part)]
+    return [float(value).hex()]
+
+
+def show(name, values):
+    print(name, hashlib.sha256(" ".join(flat(values)).encode()).hexdigest())
+
+
+draw = random.Random(1)
+names = [name for name in dir(aerodynamic_fits) if name[:3] in
+         ("CL_", "CD_", "CY_", "Cl_", "Cm_", "Cn_")]
+assert len(names) == 22
+for name in names:
+    count = 3 if name.endswith(("elevon", "rudder")) else 2
+    ranges = ((-6.0, 10.0), (4.0, 20.0), (-40.0, 30.0))[:count]
+    show(name, tuple(
+        getattr(aerodynamic_fits, name)(*(draw.uniform(*limits) for limits in ranges))
+        for _ in range(300)
+    ))
+for name, low, high in (("sin_cos", -50, 50), ("atan", -30, 30), ("asin", -1.2, 1.2),
+                        ("log_near_one", 0.7, 1.4), ("exp_small", -3, 3)):
+    function = getattr(elementary, name)
+    show(name, tuple(function(draw.uniform(low, high)) for _ in range(3000)))
+for geometric in (False, True):
+    show("atmosphere", tuple(atmosphere(draw.uniform(-1e3, 5e4), geometric) for _ in range(3000)))
+for _ in range(100):
+    state = State(*(draw.uniform(low, high) for low, high in (
+        (1300, 4000), (-80, 80), (-100, 250), (-.2, .2), (-.2, .2), (-.2, .2), (-1, 1), (-.5, .5),
+        (-3, 3), (-1e5, 1e5), (-1e5, 1e5), (15000, 40000), (80000, 140000))))
+    surfaces = Surfaces(*(draw.uniform(-0.6, 0.5) for _ in range(3)))
+    demand = Rates(*(draw.uniform(-0.5, 0.5) for _ in range(3)))
+    show("rate", state_rate(state, surfaces, 0.3, False))
+    show("step", vehicle_step(state, surfaces, 0.3, True))
+    show("jacobian", angular_response(flight_condition(state, False), surfaces))
+    show("solver", solve_surfaces(state, demand, surfaces, False))
+for case in {cases!r}:
+    for step in fly(load_case(case, duration=2.0)):
+        show(case, (step.state, step.commands))
+"""
+
+
+def run(cases, **environment):
+    """Lines that the program prints under these environment variables."""
+    result = subprocess.run(
+        [sys.executable, "-c", PROGRAM.replace("{cases!r}", repr(cases))],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return result.stdout.splitlines()
+
+
+def test_plain_floats_and_compiled_code_agree_in_every_bit():
+    cases = ["nominal_di"]
+    compiled = run(cases, NUMBA_DISABLE_JIT="0")
+    plain = run(cases, NUMBA_DISABLE_JIT="1")
+    assert len(compiled) == 22 + 5 + 2 + 400 + 201 * len(cases)
+    assert compiled == plain

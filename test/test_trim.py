@@ -1,0 +1,75 @@
+"""Trim is section 3.5.1's, to the digits that an independent solution gave."""
+
+import pytest
+from hypothesis import given, settings
+
+from ahv_plant.constants import DEGREES
+from ahv_plant.trim import trim
+from ahv_plant.vehicle import vehicle_step
+from test.flights import between
+
+
+def digits(found):
+    return (
+        found.state.w,
+        found.state.theta * DEGREES,
+        found.surfaces.right_elevon * DEGREES,
+        found.surfaces.left_elevon * DEGREES,
+        found.throttle,
+    )
+
+
+def test_trim_of_the_report():
+    found = trim()
+    assert found.converged and found.within_limits
+    assert found.residual < 1e-9
+    w, theta, right, left, throttle = digits(found)
+    assert w == pytest.approx(91.878, abs=5e-4)
+    assert (theta, right, left) == pytest.approx((2.9442, -7.2163, -7.2163), abs=5e-5)
+    assert throttle == pytest.approx(0.19417, abs=5e-6)
+    assert found.alpha == pytest.approx(found.state.theta, abs=1e-12)
+    assert (found.state.v, found.surfaces.rudder) == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+def test_trim_with_geometric_altitude():
+    found = trim(geometric=True)
+    assert digits(found) == pytest.approx((90.4445, 2.8984, -7.1616, -7.1616, 0.19534), abs=5e-4)
+
+
+@settings(max_examples=25)
+@given(between(22000.0, 27000.0), between(1600.0, 2400.0), between(100000.0, 140000.0))
+def test_a_trimmed_vehicle_stays_trimmed(altitude, speed, mass):
+    found = trim(altitude, speed, mass)
+    assert found.converged
+    state = found.state
+    if found.within_limits:
+        for _ in range(10):
+            state = vehicle_step(state, found.surfaces, found.throttle, False)
+        # only the mass changes, and the balance with it
+        assert state[:9] == pytest.approx(found.state[:9], abs=2e-3)
+        assert state.h == pytest.approx(altitude, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"altitude": 50000.0}, ("altitude", "50000", "0 to 47000 m")),
+        ({"altitude": float("nan")}, ("altitude", "nan", "0 to 47000 m")),
+        ({"speed": 900.0}, ("speed", "900", "1191 to 7147 m/s")),
+        ({"mass": 20000.0}, ("mass", "20000", "60000 to 140000 kg")),
+    ],
+)
+def test_a_condition_outside_the_model_is_named(arguments, words):
+    with pytest.raises(ValueError) as error:
+        trim(**arguments)
+    assert all(word in str(error.value) for word in words)
+
+
+def test_a_trim_beyond_the_stops_is_said_to_be():
+    found = trim(altitude=8000.0)
+    assert found.converged and found.throttle > 1.0
+    assert not found.within_limits
+
+
+def test_where_there_is_no_trim_none_is_claimed():
+    assert not trim(altitude=45000.0).converged
