@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -15,7 +16,10 @@ from ahv_msgs_py.base_node import message_class
 from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
+    DISTURBANCE_ESTIMATE,
+    LEARNER,
     LOOP_TOPICS,
+    NOMINAL_TOPICS,
     RATE_COMMAND,
     STATE,
     SURFACE_COMMAND,
@@ -27,7 +31,7 @@ from ahv_msgs_py.topics import (
 def read_bag(path: Path) -> FlightRecord:
     """The flight in the bag folder `path`; BagError says in one sentence what is wrong with it.
 
-    Only steps with a state and all four commands are returned, in the order of their stamps.
+    Only steps with a state and all its answers are returned, in the order of their stamps.
     """
     if not (path / "metadata.yaml").is_file():
         raise BagError(f"{path} is not a bag: a bag is a folder with a metadata.yaml")
@@ -38,13 +42,15 @@ def read_bag(path: Path) -> FlightRecord:
         raise BagError(
             f"{path} cannot be read as a bag: {' '.join(str(error).split())}"
         ) from error
-    missing = [name for name, messages in series.items() if not messages]
+    missing = [topic.name for topic in NOMINAL_TOPICS if not series[topic.name]]
     if missing:
         raise BagError(f"{path} holds no messages on {', '.join(missing)}")
-    stamps = sorted(set.intersection(*(set(messages) for messages in series.values())))
+    flown = {name: messages for name, messages in series.items() if messages}
+    stamps = sorted(set.intersection(*(set(messages) for messages in flown.values())))
     arrays = {
-        name: np.array([messages[stamp] for stamp in stamps]) for name, messages in series.items()
+        name: np.array([messages[stamp] for stamp in stamps]) for name, messages in flown.items()
     }
+    estimates = arrays.get(DISTURBANCE_ESTIMATE.name)
     return FlightRecord(
         np.array(stamps),
         arrays[STATE.name],
@@ -53,7 +59,17 @@ def read_bag(path: Path) -> FlightRecord:
         arrays[SURFACE_COMMAND.name],
         arrays[THROTTLE_COMMAND.name][:, 0],
         _geometric(path),
+        arrays.get(LEARNER.name),
+        None if estimates is None else estimates[:, 3:],
     )
+
+
+def read_notes(path: Path) -> dict[str, Any] | None:
+    """What `ahv fly` filed with a bag: the case and its parameters; None in other bags."""
+    metadata = yaml.safe_load((path / "metadata.yaml").read_text())
+    notes = (metadata["rosbag2_bagfile_information"].get("custom_data") or {}).get(NOTES)
+    found: dict[str, Any] | None = json.loads(notes) if notes else None
+    return found
 
 
 def _series(reader: Reader, topic: LoopTopic) -> dict[int, tuple[float, ...]]:
@@ -79,6 +95,5 @@ def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:
 
 def _geometric(path: Path) -> bool:
     """Which altitude the flight used; a bag without notes is taken to use the default."""
-    metadata = yaml.safe_load((path / "metadata.yaml").read_text())
-    notes = (metadata["rosbag2_bagfile_information"].get("custom_data") or {}).get(NOTES)
-    return bool(notes) and bool(json.loads(notes)["parameters"]["plant"]["geometric_altitude"])
+    notes = read_notes(path)
+    return notes is not None and bool(notes["parameters"]["plant"]["geometric_altitude"])

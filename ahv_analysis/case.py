@@ -5,6 +5,7 @@ The same file sets up a flight here and a node by `--ros-args --params-file`.
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,21 +14,25 @@ import yaml
 from ahv_control.flight_control import FlightControl
 from ahv_control.parameters import (
     INNER_LOOP_PARAMETERS,
+    LEARNER_PARAMETERS,
     OUTER_INTERMEDIATE_PARAMETERS,
     VELOCITY_PARAMETERS,
     inner_loop,
     intermediate_loop,
+    learner_settings,
     outer_loop,
     velocity_loop,
 )
 from ahv_msgs_py.parameters import ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
+from ahv_plant.dispersion import Dispersion
 from ahv_plant.parameters import PLANT_PARAMETERS, PlantSettings, plant_settings
 
 EVERY_NODE = "/**"
 NODES = {
     "plant": PLANT_PARAMETERS,
     "outer_intermediate": OUTER_INTERMEDIATE_PARAMETERS,
+    "disturbance_learner": LEARNER_PARAMETERS,
     "inner_loop": INNER_LOOP_PARAMETERS,
     "velocity": VELOCITY_PARAMETERS,
 }
@@ -64,10 +69,10 @@ def case_names() -> list[str]:
     return sorted(path.stem for path in (config_folder() / "cases").glob("*.yaml"))
 
 
-def load_case(name: str, duration: float | None = None) -> Case:
+def load_case(name: str, plant: Mapping[str, object] | None = None) -> Case:
     """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
 
-    `duration` [s] replaces that of the file.
+    `plant` replaces parameters of the plant: a dispersion, another start or duration.
     """
     path = Path(name)
     if path.suffix not in (".yaml", ".yml"):
@@ -77,19 +82,43 @@ def load_case(name: str, duration: float | None = None) -> Case:
             f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
         )
     given = _read(path)
-    if duration is not None:
-        given["plant"]["duration"] = duration
+    given["plant"] |= plant or {}
+    return make_case(path.stem, given)
+
+
+def dispersion_parameters(dispersion: Dispersion) -> dict[str, object]:
+    """Plant parameters of a dispersion."""
+    return {f"dispersion.{name}": value for name, value in dispersion._asdict().items()}
+
+
+def load_dispersion(path: Path) -> dict[str, object]:
+    """Plant parameters of a dispersion file: a ROS parameter file with the plant alone."""
+    given = _read(path)
+    for node, values in given.items():
+        for name in values:
+            if node != "plant" or not name.startswith(("dispersion.", "disturbance.")):
+                raise ParameterError(
+                    f"{path.name}: {node}: {name} has no place in a dispersion file; "
+                    "valid are the plant's dispersion and disturbance"
+                )
+    return given["plant"]
+
+
+def make_case(name: str, given: Mapping[str, Mapping[str, object]]) -> Case:
+    """Case of the parameters `given` for each node; ParameterError names what is wrong."""
     parameters = {
-        node: check_parameters(f"{path.name}: {node}", known, given[node])
+        node: check_parameters(f"{name}: {node}", known, given[node])
         for node, known in NODES.items()
     }
+    adaptive = parameters["inner_loop"]["adaptive"]
     control = FlightControl(
         outer_loop(parameters["outer_intermediate"]),
         intermediate_loop(parameters["outer_intermediate"]),
         inner_loop(parameters["inner_loop"]),
         velocity_loop(parameters["velocity"]),
+        learner_settings(parameters["disturbance_learner"]) if adaptive else None,
     )
-    return Case(path.stem, parameters, plant_settings(parameters["plant"]), control)
+    return Case(name, parameters, plant_settings(parameters["plant"]), control)
 
 
 def _read(path: Path) -> dict[str, dict[str, object]]:

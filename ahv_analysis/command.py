@@ -28,6 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 console = Console()
+HIGHEST_LEVEL = 0.9  # [-] of a drawn dispersion
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
@@ -99,10 +100,11 @@ def trim(
     as_json: Json = False,
 ) -> None:
     """Find level flight: section 3.5.1 of the report."""
+    from ahv_plant.dispersion import Truth
     from ahv_plant.trim import trim as solve
 
     try:
-        found = solve(altitude, speed, mass, geometric)
+        found = solve(altitude, speed, mass, Truth(geometric))
     except ValueError as error:
         raise UsageError(error) from error
     values = {
@@ -146,6 +148,15 @@ def fly(
     duration: Annotated[
         float | None, _number("s", "Length of the flight, instead of the case's")
     ] = None,
+    dispersion: Annotated[
+        str | None,
+        typer.Option(
+            help="Dispersion of the vehicle: a YAML file, or a level like 0.3 to draw one.",
+            metavar="FILE|LEVEL",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the campaign of a draw.")] = 0,
+    run: Annotated[int, typer.Option(min=0, help="Number of the run of a draw.")] = 0,
     as_json: Json = False,
 ) -> None:
     """Fly a case; record it to OUT/bag (MCAP) and sum it up in OUT/summary.json."""
@@ -155,7 +166,10 @@ def fly(
     from ahv_analysis.graph_flight import fly_graph
     from ahv_analysis.summary import summarize
 
-    flight = load_case(case, duration)
+    changes = _dispersion(dispersion, seed, run)
+    if duration is not None:
+        changes["duration"] = duration
+    flight = load_case(case, changes)
     folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     bag, summary_file = folder / "bag", folder / "summary.json"
     for path in (bag, summary_file):
@@ -165,7 +179,8 @@ def fly(
         fly_engine = fly_graph if engine == Engine.graph else fly_library
         ended_early, wall = fly_engine(flight, bag, progress=progress)
     record = read_bag(bag)
-    summary = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
+    summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
+    summary["dispersion"] = flight.plant.truth.dispersion._asdict()
     summary |= summarize(record, ended_early)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     summary_file.write_text(json.dumps(summary, indent=2) + "\n")
@@ -173,6 +188,28 @@ def fly(
         print(json.dumps(summary))
     else:
         _print_summary(summary)
+
+
+def _dispersion(choice: str | None, seed: int, run: int) -> dict[str, object]:
+    """Plant parameters of the option --dispersion."""
+    from ahv_analysis.case import dispersion_parameters, load_dispersion
+    from ahv_plant.dispersion import draw_dispersion
+
+    if choice is None:
+        return {}
+    if choice.endswith((".yaml", ".yml")):
+        if not Path(choice).is_file():
+            raise UsageError(f"dispersion {choice} is not a file")
+        return load_dispersion(Path(choice))
+    try:
+        level = float(choice)
+    except ValueError:
+        level = -1.0
+    if not 0.0 <= level <= HIGHEST_LEVEL:
+        raise UsageError(
+            f"dispersion {choice!r} is neither a YAML file nor a level from 0 to {HIGHEST_LEVEL:g}"
+        )
+    return dispersion_parameters(draw_dispersion(level, seed, run))
 
 
 def _print_summary(summary: dict[str, Any]) -> None:
@@ -203,14 +240,17 @@ def figures(
     out: Annotated[Path, typer.Option(help="Folder for the figures.")],
     as_json: Json = False,
 ) -> None:
-    """Draw the report's figures 3.2-3.7 of a recorded flight, as PNG and SVG."""
-    from ahv_analysis.bag_reader import read_bag
-    from ahv_analysis.figures import PLATES, save_figures
+    """Draw the report's figures of a recorded flight, as PNG and SVG.
 
-    record = read_bag(bag)
+    3.2-3.7 of a nominal one; 4.1-4.5 or 5.1-5.5 of an adaptive one, beside the nominal law.
+    """
+    from ahv_analysis.comparison import report_figures
+    from ahv_analysis.figures import save_figures
+
+    plates, flights = report_figures(bag)
     try:
-        with progress_bar("drawing", len(PLATES), as_json) as progress:
-            written = save_figures({"flight": record}, out, progress)
+        with progress_bar("drawing", len(plates), as_json) as progress:
+            written = save_figures(plates, flights, out, progress)
     except OSError as error:
         raise UsageError(f"cannot write figures to {out}: {error}") from error
     if as_json:

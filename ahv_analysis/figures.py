@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -55,64 +56,78 @@ def _surface(label: str, index: int) -> Panel:
     return Panel(label, lambda record: record.surfaces[:, index] * DEGREES)
 
 
-PLATES = (
-    Plate(
-        "3.2",
-        "Mach number, angle of attack and sideslip angle",
-        (
-            Panel("$M$ [-]", lambda record: record.air.mach),
-            Panel(
-                r"$\alpha$ [deg]",
-                lambda record: record.air.alpha * DEGREES,
-                bound=UNSTART_ALPHA * DEGREES,
-            ),
-            Panel(r"$\beta$ [deg]", lambda record: record.air.beta * DEGREES),
+AIR = (
+    "Mach number, angle of attack and sideslip angle",
+    (
+        Panel("$M$ [-]", lambda record: record.air.mach),
+        Panel(
+            r"$\alpha$ [deg]",
+            lambda record: record.air.alpha * DEGREES,
+            bound=UNSTART_ALPHA * DEGREES,
         ),
-    ),
-    Plate(
-        "3.3",
-        "Velocity components",
-        (_state("$u$ [m/s]", "u"), _state("$v$ [m/s]", "v"), _state("$w$ [m/s]", "w")),
-    ),
-    Plate(
-        "3.4",
-        "Altitude, mass and flight path angle",
-        (
-            _state("$h$ [km]", "h", 1e-3),
-            _state("$M_v$ [t]", "mass", 1e-3),
-            Panel(r"$\gamma$ [deg]", lambda record: record.climb_angle * DEGREES),
-        ),
-    ),
-    Plate(
-        "3.5",
-        "Roll, pitch and yaw angle",
-        (
-            _angle(r"$\phi$ [deg]", "phi", 0),
-            _angle(r"$\theta$ [deg]", "theta", 1),
-            _angle(r"$\psi$ [deg]", "psi", 2),
-        ),
-    ),
-    Plate(
-        "3.6",
-        "Roll, pitch and yaw rate",
-        (
-            _rate("$P$ [deg/s]", "P", 0),
-            _rate("$Q$ [deg/s]", "Q", 1),
-            _rate("$R$ [deg/s]", "R", 2),
-        ),
-    ),
-    Plate(
-        "3.7",
-        "Controls",
-        (
-            _surface(r"$\delta_e$ [deg]", 0),
-            _surface(r"$\delta_a$ [deg]", 1),
-            _surface(r"$\delta_r$ [deg]", 2),
-            Panel(r"$\sigma_T$ [-]", lambda record: record.throttle),
-        ),
+        Panel(r"$\beta$ [deg]", lambda record: record.air.beta * DEGREES),
     ),
 )
+VELOCITY = (
+    "Velocity components",
+    (_state("$u$ [m/s]", "u"), _state("$v$ [m/s]", "v"), _state("$w$ [m/s]", "w")),
+)
+PATH = (
+    "Altitude, mass and flight path angle",
+    (
+        _state("$h$ [km]", "h", 1e-3),
+        _state("$M_v$ [t]", "mass", 1e-3),
+        Panel(r"$\gamma$ [deg]", lambda record: record.climb_angle * DEGREES),
+    ),
+)
+ATTITUDE = (
+    "Roll, pitch and yaw angle",
+    (
+        _angle(r"$\phi$ [deg]", "phi", 0),
+        _angle(r"$\theta$ [deg]", "theta", 1),
+        _angle(r"$\psi$ [deg]", "psi", 2),
+    ),
+)
+RATES = (
+    "Roll, pitch and yaw rate",
+    (
+        _rate("$P$ [deg/s]", "P", 0),
+        _rate("$Q$ [deg/s]", "Q", 1),
+        _rate("$R$ [deg/s]", "R", 2),
+    ),
+)
+CONTROLS = (
+    "Controls",
+    (
+        _surface(r"$\delta_e$ [deg]", 0),
+        _surface(r"$\delta_a$ [deg]", 1),
+        _surface(r"$\delta_r$ [deg]", 2),
+        Panel(r"$\sigma_T$ [-]", lambda record: record.throttle),
+    ),
+)
+# Figures of a chapter, from its first number on.
+CHAPTER_3 = tuple(
+    Plate(f"3.{number}", *subject)
+    for number, subject in enumerate((AIR, VELOCITY, PATH, ATTITUDE, RATES, CONTROLS), 2)
+)
+CHAPTER_4, CHAPTER_5 = (
+    tuple(
+        Plate(f"{chapter}.{number}", *subject)
+        for number, subject in enumerate((AIR, PATH, ATTITUDE, RATES, CONTROLS), 1)
+    )
+    for chapter in (4, 5)
+)
 
+FLOWN, NOMINAL, ACTUAL, ADAPTIVE = (
+    "flight",
+    "nominal law, nominal vehicle",
+    "nominal law, actual vehicle",
+    "adaptive law, actual vehicle",
+)
+COLOURS = {FLOWN: "C0", NOMINAL: "0.55", ACTUAL: "C3", ADAPTIVE: "C0"}
+COMMAND_STYLE = {"color": "C0", "alpha": 0.6, "linestyle": "--", "linewidth": 1.0}
+
+TUMBLING = 20.0 / DEGREES  # [rad] angle of attack at which a vehicle is lost
 STYLE = {
     "font.size": 9,
     "axes.grid": True,
@@ -125,25 +140,34 @@ STYLE = {
 
 
 def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
-    """One figure with a line per flight, its commands dashed."""
+    """One figure with a line per flight; the last one is the subject, and its commands are dashed.
+
+    Other flights that ended early do not set the scale, and end with a cross where the vehicle was
+    lost.
+    """
+    subject = list(flights)[-1]
+    longest = max(record.steps for record in flights.values())
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(
-            len(plate.panels), 1, sharex=True, figsize=(6.4, 1.9 * len(plate.panels) + 0.6)
+            len(plate.panels), 1, sharex=True, figsize=(6.4, 1.9 * len(plate.panels) + 0.8)
         )
         for panel, axis in zip(plate.panels, axes, strict=True):
-            for number, (label, record) in enumerate(flights.items()):
-                axis.plot(record.time, panel.values(record), color=f"C{number}", label=label)
-                if panel.command is not None:
-                    axis.plot(
-                        record.time,
-                        panel.command(record),
-                        color=f"C{number}",
-                        alpha=0.6,
-                        linestyle="--",
-                        linewidth=1.0,
-                        label="command" if number == 0 else None,
-                    )
-            _settle_scale(axis)
+            seen = []
+            for label, record in flights.items():
+                values = panel.values(record)
+                lost = record.steps < longest and label != subject
+                shown = slice(_flying(record) if lost else None)
+                time, drawn = record.time[shown], values[shown]
+                axis.plot(time, drawn, color=COLOURS[label], label=label)
+                if lost:
+                    axis.plot(time[-1], drawn[-1], "x", color=COLOURS[label])
+                else:
+                    seen.append(values)
+                if panel.command is not None and label == subject:
+                    command = panel.command(record)
+                    axis.plot(record.time, command, label="command", **COMMAND_STYLE)
+                    seen.append(command)
+            _scale(axis, np.concatenate(seen), panel.bound if len(flights) > 1 else None)
             if panel.bound is not None:
                 low, high = axis.get_ylim()
                 for bound in (-panel.bound, panel.bound):
@@ -153,30 +177,50 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
         axes[-1].set_xlabel("time [s]")
         axes[-1].margins(x=0)
         figure.suptitle(f"Figure {plate.number}: {plate.title}", fontsize=10, x=0.02, ha="left")
-        if len(flights) > 1 or any(panel.command for panel in plate.panels):
-            figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", frameon=False)
         figure.align_ylabels(axes)
-        figure.tight_layout()
+        figure.tight_layout(rect=(0, 0, 1, 0.97 if len(flights) > 1 else 1))
+        if len(flights) > 1 or any(panel.command for panel in plate.panels):
+            figure.legend(
+                *axes[0].get_legend_handles_labels(),
+                loc="upper left",
+                bbox_to_anchor=(0.01, 0.955 + 0.003 * len(plate.panels)),
+                ncols=4,
+                frameon=False,
+                fontsize=8,
+            )
     return figure
 
 
-def _settle_scale(axis: pyplot.Axes) -> None:
-    """Widen an axis that shows nothing but rounding, so that zero looks like zero."""
-    low, high = axis.get_ylim()
+def _flying(record: FlightRecord) -> int:
+    """Number of states until the vehicle tumbled."""
+    tumbling = np.abs(record.air.alpha) > TUMBLING
+    return int(np.argmax(tumbling)) + 1 if np.any(tumbling) else len(record.stamps)
+
+
+def _scale(axis: pyplot.Axes, values: Array, bound: float | None) -> None:
+    """Fit an axis to values, and to plus and minus a bound if there is one to be seen against.
+
+    A quantity that is nothing but rounding is drawn as the zero that it is.
+    """
+    low, high = float(np.min(values)), float(np.max(values))
+    if bound is not None:
+        low, high = min(low, -1.3 * bound), max(high, 1.3 * bound)
     if high - low < 1e-6:
-        middle = 0.5 * (low + high)
-        axis.set_ylim(middle - 1.0, middle + 1.0)
+        low, high = low - 1.0, high + 1.0
+    margin = 0.08 * (high - low)
+    axis.set_ylim(low - margin, high + margin)
 
 
 def save_figures(
+    plates: Sequence[Plate],
     flights: Mapping[str, FlightRecord],
     folder: Path,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Path]:
-    """Draw every figure as PNG and SVG into `folder`; `progress(done)` after each."""
+    """Draw figures as PNG and SVG into `folder`; `progress(done)` after each."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for done, plate in enumerate(PLATES, 1):
+    for done, plate in enumerate(plates, 1):
         figure = draw(plate, flights)
         for kind in ("png", "svg"):
             path = folder / f"figure_{plate.number.replace('.', '_')}.{kind}"

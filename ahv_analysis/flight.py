@@ -1,25 +1,39 @@
 """A flight in this process, without ROS: the same laws and vehicle, composed the same way."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from ahv_analysis.bag_writer import BagWriter
 from ahv_analysis.case import Case, notes
-from ahv_control.flight_control import NEUTRAL, Commands, flight_control
+from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
+from ahv_control.flight_control import (
+    NEUTRAL,
+    Commands,
+    FlightControl,
+    adaptive_control,
+    first_learner,
+    next_learner,
+    nominal_control,
+)
+from ahv_control.intermediate_loop import Rates
+from ahv_control.learner_message import estimate_values, learner_values
 from ahv_msgs_py.layout import NANOSECONDS, clock_bytes
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
     CLOCK,
+    DISTURBANCE_ESTIMATE,
+    LEARNER,
     RATE_COMMAND,
     STATE,
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
+    LoopTopic,
 )
-from ahv_plant.constants import STEP_NS
-from ahv_plant.departure import departure, departure_reason
-from ahv_plant.state import State
+from ahv_plant.constants import STEP, STEP_NS
+from ahv_plant.departure import departure_reason
+from ahv_plant.state import State, Surfaces
 from ahv_plant.vehicle import vehicle_step
 
 
@@ -29,19 +43,38 @@ class Step(NamedTuple):
     stamp: int  # [ns]
     state: State
     commands: Commands
+    learner: LearnerState | None
+    ended_early: str  # why this is the last step before its time; empty if it is not
 
 
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the vehicle departs from the model."""
-    state = case.plant.initial
-    surfaces = NEUTRAL
-    for step in range(case.plant.steps + 1):
-        commands = flight_control(state, surfaces, case.control)
-        surfaces = commands.surfaces
-        yield Step(step * STEP_NS, state, commands)
-        if departure(state, case.plant.geometric):
+    state, truth, control = case.plant.initial, case.plant.truth, case.control
+    learner = None if control.learner is None else first_learner(state)
+    commands = _answer(state, learner, NEUTRAL, control)
+    for step in range(case.plant.steps):
+        later = State(
+            *vehicle_step(state, commands.surfaces, commands.throttle, step * STEP, truth)
+        )
+        reason = departure_reason(later, truth.geometric, (step + 1) * STEP)
+        yield Step(step * STEP_NS, state, commands, learner, reason)
+        if reason:
             return
-        state = vehicle_step(state, surfaces, commands.throttle, case.plant.geometric)
+        if learner is not None:
+            learner = next_learner(
+                learner, state, commands.surfaces, commands.rates, later, control.learner
+            )
+        commands = _answer(later, learner, commands.surfaces, control)
+        state = later
+    yield Step(case.plant.steps * STEP_NS, state, commands, learner, "")
+
+
+def _answer(
+    state: State, learner: LearnerState | None, previous: Surfaces, control: FlightControl
+) -> Commands:
+    if learner is None:
+        return nominal_control(state, previous, control)
+    return adaptive_control(state, learner, previous, control)
 
 
 def fly_library(
@@ -60,18 +93,24 @@ def fly_library(
             progress(step.stamp // STEP_NS)
     wall = time.perf_counter() - started
     bag.close()
-    return departure_reason(step.state, case.plant.geometric, step.stamp / NANOSECONDS), wall
+    return step.ended_early, wall
 
 
 def write_step(bag: BagWriter, step: Step) -> None:
     """File a step as the recorder files the messages of the graph."""
     answers = step.commands
     bag.write(CLOCK.name, clock_bytes(step.stamp))
-    for topic, values in (
+    messages: list[tuple[LoopTopic, Sequence[float]]] = [
         (STATE, step.state),
         (ATTITUDE_COMMAND, answers.attitude),
         (RATE_COMMAND, answers.rates),
         (SURFACE_COMMAND, answers.surfaces),
         (THROTTLE_COMMAND, (answers.throttle,)),
-    ):
+    ]
+    if step.learner is not None:
+        rates = Rates(step.state.P, step.state.Q, step.state.R)
+        estimate = disturbance_estimate(step.learner, rates)
+        messages.append((LEARNER, learner_values(step.learner)))
+        messages.append((DISTURBANCE_ESTIMATE, estimate_values(estimate)))
+    for topic, values in messages:
         bag.write(topic.name, topic.layout.encode(step.stamp, values))

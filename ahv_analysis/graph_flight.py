@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
@@ -11,18 +11,36 @@ from rclpy.experimental import EventsExecutor
 from ahv_analysis.case import Case, notes
 from ahv_analysis.flight import fly
 from ahv_analysis.recorder_node import RecorderNode
+from ahv_control.disturbance_learner_node import DisturbanceLearnerNode
 from ahv_control.inner_loop_node import InnerLoopNode
 from ahv_control.outer_intermediate_node import OuterIntermediateNode
 from ahv_control.velocity_node import VelocityNode
 from ahv_msgs_py.base_node import BaseNode
+from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
+CONTROLLERS = {
+    "outer_intermediate": OuterIntermediateNode,
+    "disturbance_learner": DisturbanceLearnerNode,
+    "inner_loop": InnerLoopNode,
+    "velocity": VelocityNode,
+}
 LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
 LOOK = 0.2  # [s] between looks at the progress
 
 
 class GraphError(RuntimeError):
     """The graph did not do what a graph must; the message is one sentence."""
+
+
+def controllers(case: Case) -> list[str]:
+    """Names of the controller nodes that a case needs."""
+    return [name for name in CONTROLLERS if name != "disturbance_learner" or case.control.learner]
+
+
+def loop_topics(case: Case) -> Sequence[LoopTopic]:
+    """Topics of the control loop of a case."""
+    return LOOP_TOPICS if case.control.learner else NOMINAL_TOPICS
 
 
 def fly_graph(
@@ -48,12 +66,7 @@ def fly_graph(
         if bag is not None:
             recorder = RecorderNode({"bag": str(bag), "notes": notes(case)}, context)
             nodes.append(recorder)
-        for name, node_class in (
-            ("outer_intermediate", OuterIntermediateNode),
-            ("inner_loop", InnerLoopNode),
-            ("velocity", VelocityNode),
-        ):
-            nodes.append(node_class(case.parameters[name], context))
+        nodes += [CONTROLLERS[name](case.parameters[name], context) for name in controllers(case)]
         listeners = len(nodes)
         plant = PlantNode(case.parameters["plant"] | {"listeners": listeners}, context)
         nodes.append(plant)
@@ -65,7 +78,7 @@ def fly_graph(
         _spin(executor, plant, progress)
         wall = time.perf_counter() - started
         if recorder is not None:
-            _drain(executor, recorder, plant.step)
+            _drain(executor, recorder, loop_topics(case), plant.step)
         return plant.finished.result(), wall
     finally:
         for node in nodes:
@@ -90,10 +103,12 @@ def _spin(executor: EventsExecutor, plant: PlantNode, progress: Callable[[int], 
             )
 
 
-def _drain(executor: EventsExecutor, recorder: RecorderNode, steps: int) -> None:
+def _drain(
+    executor: EventsExecutor, recorder: RecorderNode, topics: Sequence[LoopTopic], steps: int
+) -> None:
     """Let the recorder take what is still under way."""
     deadline = time.monotonic() + LONGEST_SILENCE
-    while recorder.missing(steps):
+    while recorder.missing(topics, steps):
         executor.spin_once(LOOK)
         if time.monotonic() > deadline:
-            raise GraphError(f"the recorder missed {recorder.missing(steps)} messages")
+            raise GraphError(f"the recorder missed {recorder.missing(topics, steps)} messages")

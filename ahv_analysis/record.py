@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ahv_analysis.flight import Step
+from ahv_control.disturbance_learner import disturbance_estimate
+from ahv_control.intermediate_loop import Rates
+from ahv_control.learner_message import learner_values
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_plant.aerodynamics import AirData, air_data
 from ahv_plant.constants import UNSTART_ALPHA
@@ -27,6 +30,8 @@ class FlightRecord:
     surfaces: Array  # (N+1, 3) [rad]
     throttle: Array  # (N+1,) [-]
     geometric: bool  # h is a geometric altitude
+    learner: Array | None = None  # (N+1, 39) X_a, X_d [rad/s] and weights, of an adaptive flight
+    estimates: Array | None = None  # (N+1, 3) d-hat [rad/s^2], of an adaptive flight
 
     @property
     def steps(self) -> int:
@@ -69,6 +74,12 @@ def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     """Arrays of the steps of a library flight."""
     flown = list(steps)
     answers = [step.commands for step in flown]
+    learners = [learner_values(step.learner) for step in flown if step.learner]
+    estimates = [
+        disturbance_estimate(step.learner, Rates(step.state.P, step.state.Q, step.state.R))
+        for step in flown
+        if step.learner
+    ]
     return FlightRecord(
         np.array([step.stamp for step in flown]),
         np.array([step.state for step in flown]),
@@ -77,4 +88,6 @@ def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
         np.array([answer.surfaces for answer in answers]),
         np.array([answer.throttle for answer in answers]),
         geometric,
+        np.array(learners) if learners else None,
+        np.array(estimates) if estimates else None,
     )

@@ -1,5 +1,6 @@
 """Node `recorder`: every topic of the graph into an MCAP bag, the bytes as they came."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import rclpy
 from ahv_analysis.bag_writer import BagError, BagWriter
 from ahv_msgs_py.base_node import OK, QOS, VOLATILE_QOS, BaseNode, message_class, run
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
-from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
+from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS, LoopTopic
 
 RECORDER_PARAMETERS = (
     Parameter("bag", "bag", "folder of the bag to write; it must not exist"),
@@ -42,9 +43,9 @@ class RecorderNode(BaseNode):
             self.create_subscription(message_type, name, write, quality, raw=True)
         self.report(0, OK, f"recording to {self._bag.path}")
 
-    def missing(self, steps: int) -> int:
-        """How many messages of the loop are still to come, if the flight has this many steps."""
-        return sum(max(0, steps + 1 - self._bag.counts[topic.name]) for topic in LOOP_TOPICS)
+    def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:
+        """How many messages of these topics are still to come from a flight of so many steps."""
+        return sum(max(0, steps + 1 - self._bag.counts[topic.name]) for topic in topics)
 
     def destroy_node(self) -> None:
         """Close the bag, then the node."""

@@ -95,6 +95,13 @@ def angular_response(
 
 
 @elementwise
+def nominal_response(state: State, surfaces: Surfaces, geometric: bool) -> Rates:
+    """f(X, U) [rad/s^2]: angular acceleration of the nominal vehicle, eq 2.3."""
+    response, _, _, _ = angular_response(flight_condition(state, geometric), surfaces)
+    return response
+
+
+@elementwise
 def determinant(a: Rates, b: Rates, c: Rates) -> float:
     """Determinant of the matrix with columns a, b, c."""
     return (

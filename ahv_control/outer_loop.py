@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ahv_plant.compiled import elementwise
 from ahv_plant.elementary import asin, atan, sin_cos
-from ahv_plant.state import State
+from ahv_plant.state import State, clamp
 
 
 class OuterLoop(NamedTuple):
@@ -13,6 +13,7 @@ class OuterLoop(NamedTuple):
 
     altitude: float  # [m] h*
     k_h: float  # [1/s]
+    alpha_limit: float  # [rad] bound for the angle of attack; pi is no bound
 
 
 class Attitude(NamedTuple):
@@ -29,9 +30,16 @@ def attitude_command(state: State, settings: OuterLoop) -> Attitude:
 
     Solves h_dot = k_h (h* - h) for theta. The report prints a minus before the arcsine, with which
     the altitude runs away; its own line above gives the plus (docs/errata.md).
+
+    Beyond the report, the command keeps the angle of attack within its limit: pitch less the
+    present climb angle is the angle of attack that the vehicle will settle at. Where altitude and
+    limit cannot both be had, the vehicle sinks into denser air.
     """
     sin_phi, cos_phi = sin_cos(state.phi)
     B = state.v * sin_phi + state.w * cos_phi
     climb = settings.k_h * (settings.altitude - state.h)
-    theta = atan(B / state.u) + asin(climb / sqrt(state.u * state.u + B * B))
-    return Attitude(0.0, theta, 0.0)
+    alpha = atan(B / state.u)  # in the vertical plane
+    theta = alpha + asin(climb / sqrt(state.u * state.u + B * B))
+    climb_angle = state.theta - alpha
+    limit = settings.alpha_limit
+    return Attitude(0.0, clamp(theta, climb_angle - limit, climb_angle + limit), 0.0)

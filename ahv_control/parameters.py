@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 
+from ahv_control.disturbance_learner import LearnerSettings
+from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.inner_loop import InnerLoop
-from ahv_control.intermediate_loop import IntermediateLoop
+from ahv_control.intermediate_loop import IntermediateLoop, Rates
 from ahv_control.outer_loop import OuterLoop
 from ahv_control.velocity_loop import VelocityLoop
 from ahv_msgs_py.parameters import Parameter, Value
+from ahv_plant.constants import RADIANS
 from ahv_plant.parameters import GEOMETRIC_ALTITUDE
 
 FASTEST = 50.0  # [1/s] gains above half the control rate cannot be meant
@@ -22,11 +25,50 @@ OUTER_INTERMEDIATE_PARAMETERS = (
     _gain("k_phi", 0.2, "roll-angle gain, section 3.2"),
     _gain("k_theta", 0.2, "pitch-angle gain, section 3.2"),
     _gain("k_psi", 0.2, "yaw-angle gain, section 3.2"),
+    Parameter(
+        "alpha_limit",
+        180.0,
+        "angle of attack that commands stay within; 180 is off",
+        "deg",
+        0.1,
+        180.0,
+    ),
 )
-INNER_LOOP_PARAMETERS = (
+
+
+def _bound(name: str) -> Parameter:
+    return Parameter(
+        name, 5.0, f"bound k_s of the {name[-1]} error, eq 5.4", "deg/s", 0.001, 1000.0
+    )
+
+
+_TRACKING = (
     _gain("k_P", 2.0, "roll-rate gain, section 3.3"),
     _gain("k_Q", 2.0, "pitch-rate gain, section 3.3"),
     _gain("k_R", 2.0, "yaw-rate gain, section 3.3"),
+    *(_bound(f"k_s_{rate}") for rate in "PQR"),
+    Parameter("lambda", 1.0, "exponent of eq 5.8: 1 is plain dynamic inversion", "", 0.0, 3.0),
+)
+_OBSERVER = (
+    _gain("k_ap_P", 15.0, "observer gain of the roll channel, eq 4.3"),
+    _gain("k_ap_Q", 18.0, "observer gain of the pitch channel, eq 4.3"),
+    _gain("k_ap_R", 15.0, "observer gain of the yaw channel, eq 4.3"),
+)
+INNER_LOOP_PARAMETERS = (
+    Parameter("adaptive", False, "follow the disturbance learner (chapters 4 and 5)"),
+    *_TRACKING,
+    *_OBSERVER,
+    _gain("k_ad_P", 5.0, "roll gain of the approximate to the desired plant, eq 4.4"),
+    _gain("k_ad_Q", 7.0, "pitch gain of the approximate to the desired plant, eq 4.4"),
+    _gain("k_ad_R", 5.0, "yaw gain of the approximate to the desired plant, eq 4.4"),
+    GEOMETRIC_ALTITUDE,
+)
+LEARNER_PARAMETERS = (
+    *_TRACKING,
+    *_OBSERVER,
+    Parameter("k_b", 0.7, "bound on the observer error, eq 4.11", "deg/s", 0.01, 100.0),
+    Parameter("gamma", 40.0, "learning rate, eq 4.11", "deg^2/s^4", 0.1, 1e4),
+    Parameter("theta", 0.01, "weight of the Jacobian's error, eq 4.11", "s^2", 0.0, 1e3),
     GEOMETRIC_ALTITUDE,
 )
 VELOCITY_PARAMETERS = (
@@ -40,7 +82,9 @@ Values = Mapping[str, Value]
 
 def outer_loop(values: Values) -> OuterLoop:
     """Outer-loop settings from checked parameters."""
-    return OuterLoop(float(values["altitude"]), float(values["k_h"]))
+    return OuterLoop(
+        float(values["altitude"]), float(values["k_h"]), float(values["alpha_limit"]) * RADIANS
+    )
 
 
 def intermediate_loop(values: Values) -> IntermediateLoop:
@@ -48,10 +92,36 @@ def intermediate_loop(values: Values) -> IntermediateLoop:
     return IntermediateLoop(*(float(values[name]) for name in IntermediateLoop._fields))
 
 
+def _rates(values: Values, prefix: str, scale: float = 1.0) -> Rates:
+    return Rates(*(float(values[f"{prefix}_{rate}"]) * scale for rate in "PQR"))
+
+
+def _error_dynamics(values: Values, prefix: str) -> ErrorDynamics:
+    """Error dynamics with the gains of a prefix; the bounds and the exponent are shared."""
+    bound = _rates(values, "k_s", RADIANS)
+    return ErrorDynamics(_rates(values, prefix), bound, float(values["lambda"]))
+
+
 def inner_loop(values: Values) -> InnerLoop:
     """Inner-loop settings from checked parameters."""
-    gains = (float(values[name]) for name in ("k_P", "k_Q", "k_R"))
-    return InnerLoop(*gains, geometric=bool(values["geometric_altitude"]))
+    return InnerLoop(
+        _error_dynamics(values, "k"),
+        _error_dynamics(values, "k_ad"),
+        _rates(values, "k_ap"),
+        bool(values["geometric_altitude"]),
+    )
+
+
+def learner_settings(values: Values) -> LearnerSettings:
+    """Disturbance-learner settings from checked parameters."""
+    return LearnerSettings(
+        _error_dynamics(values, "k"),
+        _rates(values, "k_ap"),
+        float(values["k_b"]),
+        float(values["gamma"]),
+        float(values["theta"]),
+        bool(values["geometric_altitude"]),
+    )
 
 
 def velocity_loop(values: Values) -> VelocityLoop:

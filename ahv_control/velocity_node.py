@@ -6,7 +6,7 @@ from ahv_control.parameters import VELOCITY_PARAMETERS, velocity_loop
 from ahv_control.velocity_loop import throttle_command
 from ahv_msgs_py.base_node import OK, WARN, BaseNode, run
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Stepwise, Values
+from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import STATE, SURFACE_COMMAND, THROTTLE_COMMAND
 from ahv_plant.constants import THROTTLE_MAXIMUM, THROTTLE_MINIMUM
 from ahv_plant.state import State, Surfaces
@@ -22,11 +22,7 @@ class VelocityNode(BaseNode):
         super().__init__("velocity", VELOCITY_PARAMETERS, values, context)
         self._loop = velocity_loop(self.settings)
         self._send = self.sender(THROTTLE_COMMAND)
-        inputs = Stepwise((STATE.name, SURFACE_COMMAND.name), self._answer)
-        for topic in (STATE, SURFACE_COMMAND):
-            self.receive(
-                topic, lambda stamp, values, name=topic.name: inputs.put(name, stamp, values)
-            )
+        self.receive_together((STATE, SURFACE_COMMAND), self._answer)
 
     def _answer(self, stamp: int, state: Values, surfaces: Values) -> None:
         throttle = throttle_command(State(*state), Surfaces(*surfaces), self._loop)

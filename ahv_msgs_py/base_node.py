@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -21,7 +22,7 @@ from rclpy.task import Future
 
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value, check_parameters
-from ahv_msgs_py.stepwise import Values
+from ahv_msgs_py.stepwise import Stepwise, Values
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE, QUEUE_DEPTH, LoopTopic
 
 
@@ -138,6 +139,12 @@ class BaseNode(Node):
             handle(*known)
 
         self.create_subscription(message_type, topic.name, read, QOS, raw=True)
+
+    def receive_together(self, topics: Sequence[LoopTopic], answer: Callable[..., None]) -> None:
+        """Subscribe to loop topics; `answer(stamp, values, ...)` gets those of one step."""
+        inputs = Stepwise([topic.name for topic in topics], answer)
+        for topic in topics:
+            self.receive(topic, partial(inputs.put, topic.name))
 
     def report(self, stamp: int, level: bytes, text: str, **facts: object) -> None:
         """Publish a diagnostic status at `stamp` [ns], if it differs from the last one."""

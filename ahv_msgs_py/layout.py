@@ -94,6 +94,17 @@ class NamedVector(Layout):
         return tuple(message.position)
 
 
+class StampedAcceleration(Layout):
+    """geometry_msgs/AccelStamped: three linear and three angular doubles."""
+
+    def __init__(self, frame: str, fields: Sequence[str]):
+        super().__init__("geometry_msgs/msg/AccelStamped", frame, fields, b"", b"")
+
+    def _read(self, message: Any) -> tuple[float, ...]:
+        linear, angular = message.accel.linear, message.accel.angular
+        return linear.x, linear.y, linear.z, angular.x, angular.y, angular.z
+
+
 class StampedVector(Layout):
     """geometry_msgs/Vector3Stamped: three doubles."""
 

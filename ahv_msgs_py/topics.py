@@ -9,7 +9,7 @@ a step.
 
 from typing import NamedTuple
 
-from ahv_msgs_py.layout import Layout, NamedVector, StampedVector
+from ahv_msgs_py.layout import Layout, NamedVector, StampedAcceleration, StampedVector
 
 NAMESPACE = "/ahv"
 BODY_FRAME = "base_link_frd"
@@ -17,6 +17,11 @@ EARTH_FRAME = "map_ned"
 QUEUE_DEPTH = 100  # messages kept per topic, sender and receiver
 
 STATE_NAMES = ("u", "v", "w", "P", "Q", "R", "phi", "theta", "psi", "x", "y", "h", "mass")
+BASIS_NAMES = ("one", "P", "P2", "Q", "Q2", "P2Q2", "R", "R2", "P2R2", "Q2R2", "P2Q2R2")
+LEARNER_NAMES = (
+    *(f"{plant}.{rate}" for plant in ("X_a", "X_d") for rate in "PQR"),
+    *(f"W_{rate}.{term}" for rate in "PQR" for term in BASIS_NAMES),
+)
 SURFACE_NAMES = ("right_elevon", "left_elevon", "rudder")
 
 
@@ -69,7 +74,22 @@ THROTTLE_COMMAND = LoopTopic(
     "1",
     "throttle sigma_T of the velocity loop",
 )
-LOOP_TOPICS = (STATE, ATTITUDE_COMMAND, RATE_COMMAND, SURFACE_COMMAND, THROTTLE_COMMAND)
+NOMINAL_TOPICS = (STATE, ATTITUDE_COMMAND, RATE_COMMAND, SURFACE_COMMAND, THROTTLE_COMMAND)
+
+DISTURBANCE_ESTIMATE = LoopTopic(
+    "/ahv/disturbance_estimate",
+    StampedAcceleration(BODY_FRAME, ("x", "y", "z", "P", "Q", "R")),
+    "m/s^2 (zero), rad/s^2",
+    "learned disturbance d-hat of the rates of P, Q, R, as angular acceleration",
+)
+LEARNER = LoopTopic(
+    "/ahv/learner",
+    NamedVector(BODY_FRAME, LEARNER_NAMES),
+    "rad/s for X_a and X_d; weights in deg/s^2 by the units of the basis in deg/s",
+    "state of the disturbance learner: approximate plant, desired plant, weights",
+)
+LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)
+LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS
 
 CLOCK = ViewerTopic("/clock", "rosgraph_msgs/msg/Clock", 4, "simulated time at 100 Hz")
 ODOMETRY = ViewerTopic(

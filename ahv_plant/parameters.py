@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
-from ahv_plant.constants import INITIAL_MASS, RADIANS, STEP
+from ahv_plant.constants import DEGREES, INITIAL_MASS, RADIANS, STEP
+from ahv_plant.dispersion import AxisDisturbance, Dispersion, Disturbance, Truth
 from ahv_plant.mass_properties import MASS_MAXIMUM, MASS_MINIMUM
 from ahv_plant.state import State
 from ahv_plant.trim import check_flight_condition
@@ -13,7 +14,7 @@ GEOMETRIC_ALTITUDE = Parameter(
     "geometric_altitude", False, "h is geometric altitude; if false, geopotential as in the report"
 )
 
-PLANT_PARAMETERS = (
+FLIGHT_PARAMETERS = (
     Parameter("duration", 150.0, "length of the flight", "s", STEP, 3600.0),
     Parameter("initial.u", 1786.4, "body velocity forward", "m/s", 0.0, 8000.0),
     Parameter("initial.v", 0.0, "body velocity right", "m/s", -500.0, 500.0),
@@ -34,13 +35,33 @@ PLANT_PARAMETERS = (
     ),
 )
 
+_DISTURBANCE_PARTS = (
+    ("constant", "constant disturbance", "deg/s^2", 100.0),
+    ("step", "disturbance from step_time on", "deg/s^2", 100.0),
+    ("step_time", "time of the step", "s", 3600.0),
+    ("amplitude", "amplitude of a sine", "deg/s^2", 100.0),
+    ("frequency", "frequency of the sine", "rad/s", 100.0),
+    *((rate, f"disturbance by {rate}", "1/s", 10.0) for rate in "PQR"),
+    *((f"{rate}2", f"disturbance by {rate}^2", "1/deg", 10.0) for rate in "PQR"),
+)
+DISPERSION_PARAMETERS = tuple(
+    Parameter(f"dispersion.{name}", 1.0, f"multiplier of the true {name}", "", 0.05, 5.0)
+    for name in Dispersion._fields
+)
+DISTURBANCE_PARAMETERS = tuple(
+    Parameter(f"disturbance.{axis}.{part}", 0.0, f"rate of {axis}: {words}", unit, -limit, limit)
+    for axis in Disturbance._fields
+    for part, words, unit, limit in _DISTURBANCE_PARTS
+)
+PLANT_PARAMETERS = FLIGHT_PARAMETERS + DISPERSION_PARAMETERS + DISTURBANCE_PARAMETERS
+
 
 class PlantSettings(NamedTuple):
     """What the plant flies: in SI units."""
 
     initial: State
     steps: int  # number of integration steps of 0.01 s
-    geometric: bool  # h is a geometric altitude
+    truth: Truth
 
 
 def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
@@ -57,4 +78,27 @@ def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
         check_flight_condition(initial.h, initial.u, initial.mass, geometric)
     except ValueError as error:
         raise ParameterError(f"plant: initial {error}") from error
-    return PlantSettings(initial, round(float(values["duration"]) / STEP), geometric)
+    truth = Truth(geometric, _dispersion(values), _disturbance(values))
+    return PlantSettings(initial, round(float(values["duration"]) / STEP), truth)
+
+
+def _dispersion(values: Mapping[str, Value]) -> Dispersion:
+    return Dispersion(*(float(values[parameter.name]) for parameter in DISPERSION_PARAMETERS))
+
+
+def _disturbance(values: Mapping[str, Value]) -> Disturbance | None:
+    """Disturbance in radians; None where every part is zero."""
+    if not any(values[parameter.name] for parameter in DISTURBANCE_PARAMETERS):
+        return None
+    scales = {"deg/s^2": RADIANS, "1/deg": DEGREES}
+    return Disturbance(
+        *(
+            AxisDisturbance(
+                *(
+                    float(values[f"disturbance.{axis}.{part}"]) * scales.get(unit, 1.0)
+                    for part, _, unit, _ in _DISTURBANCE_PARTS
+                )
+            )
+            for axis in Disturbance._fields
+        )
+    )

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ahv_msgs_py.base_node import ERROR, OK, QOS, BaseNode, message_class, run
 from ahv_msgs_py.layout import NANOSECONDS, clock_bytes
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Stepwise, Values
+from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import (
     BODY_FRAME,
     CLOCK,
@@ -21,7 +21,7 @@ from ahv_msgs_py.topics import (
     THROTTLE_COMMAND,
     TRANSFORM,
 )
-from ahv_plant.constants import STEP_NS
+from ahv_plant.constants import STEP, STEP_NS
 from ahv_plant.departure import departure_reason
 from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
 from ahv_plant.state import State, Surfaces
@@ -45,14 +45,10 @@ class PlantNode(BaseNode):
         self.step = 0
         self.state = self.flight.initial
         self._started = False
-        inputs = Stepwise((SURFACE_COMMAND.name, THROTTLE_COMMAND.name), self._advance)
+        self.receive_together((SURFACE_COMMAND, THROTTLE_COMMAND), self._advance)
         self._clock = self.create_publisher(message_class(CLOCK.type_name), CLOCK.name, QOS)
         self._odometry = self.create_publisher(Odometry, ODOMETRY.name, QOS)
         self._transform = self._transform_publisher()
-        for topic in (SURFACE_COMMAND, THROTTLE_COMMAND):
-            self.receive(
-                topic, lambda stamp, values, name=topic.name: inputs.put(name, stamp, values)
-            )
         self._send_state = self.sender(STATE, self._listeners_changed)
 
     def _transform_publisher(self) -> Any:
@@ -80,17 +76,20 @@ class PlantNode(BaseNode):
         """Integrate one step, or end the flight."""
         if stamp != self.step * STEP_NS or self.finished.done():
             return
-        reason = departure_reason(self.state, self.flight.geometric, stamp / NANOSECONDS)
+        if self.step == self.flight.steps:
+            self._finish(stamp, OK, "")
+            return
+        truth = self.flight.truth
+        later = State(
+            *vehicle_step(self.state, Surfaces(*surfaces), throttle[0], self.step * STEP, truth)
+        )
+        reason = departure_reason(later, truth.geometric, (self.step + 1) * STEP)
         if reason:
             self._finish(stamp, ERROR, reason)
-        elif self.step == self.flight.steps:
-            self._finish(stamp, OK, "")
-        else:
-            self.state = State(
-                *vehicle_step(self.state, Surfaces(*surfaces), throttle[0], self.flight.geometric)
-            )
-            self.step += 1
-            self._publish()
+            return
+        self.state = later
+        self.step += 1
+        self._publish()
 
     def _finish(self, stamp: int, level: bytes, reason: str) -> None:
         self.report(stamp, level, reason or "flown to the end", steps=self.step)

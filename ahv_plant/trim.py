@@ -14,6 +14,7 @@ from ahv_plant.atmosphere import (
     geopotential_altitude,
 )
 from ahv_plant.constants import INITIAL_MASS
+from ahv_plant.dispersion import NOMINAL, Truth
 from ahv_plant.mass_properties import MASS_MAXIMUM, MASS_MINIMUM
 from ahv_plant.state import State, Surfaces, limit_surfaces, limit_throttle
 from ahv_plant.vehicle import state_rate
@@ -62,14 +63,15 @@ def trim(
     altitude: float = CRUISE_ALTITUDE,
     speed: float = CRUISE_SPEED,
     mass: float = INITIAL_MASS,
-    geometric: bool = False,
+    truth: Truth = NOMINAL,
 ) -> Trim:
     """Level flight at `altitude` [m], u = `speed` [m/s] and `mass` [kg], section 3.5.1.
 
     Solves the rates of u, v, w, P, Q, R and h for v, w, theta, the three surfaces and sigma_T, all
-    other states being zero. Raises ValueError outside the range of the model.
+    other states being zero, of the true vehicle `truth`. Raises ValueError outside the range of
+    the model.
     """
-    check_flight_condition(altitude, speed, mass, geometric)
+    check_flight_condition(altitude, speed, mass, truth.geometric)
 
     def flight(unknowns: np.ndarray) -> tuple[State, Surfaces, float]:
         v, w, theta, right, left, rudder, throttle = (float(value) for value in unknowns)
@@ -77,7 +79,7 @@ def trim(
         return state, Surfaces(right, left, rudder), throttle
 
     def residuals(unknowns: np.ndarray) -> list[float]:
-        rate = state_rate(*flight(unknowns), geometric)
+        rate = state_rate(*flight(unknowns), 0.0, truth)
         return [rate.u, rate.v, rate.w, rate.P, rate.Q, rate.R, rate.h]
 
     guess = [0.0, 0.05 * speed, 0.05, -0.1, -0.1, 0.0, 0.2]

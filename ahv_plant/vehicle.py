@@ -3,20 +3,51 @@
 from ahv_plant.aerodynamics import Loads, aerodynamic_coefficients, air_data, loads
 from ahv_plant.compiled import elementwise
 from ahv_plant.constants import GRAVITY, MAXIMUM_THRUST, SPECIFIC_IMPULSE, STEP
+from ahv_plant.dispersion import (
+    Truth,
+    disperse_coefficients,
+    disperse_inertia,
+    disturbance_acceleration,
+)
 from ahv_plant.mass_properties import centre_of_gravity, inertia
 from ahv_plant.rigid_body import motion
 from ahv_plant.state import State, Surfaces, limit_surfaces, limit_throttle
 
 
 @elementwise
-def state_rate(state: State, surfaces: Surfaces, throttle: float, geometric: bool) -> State:
-    """Rates of the 13 states, eqs 2.1-2.14, with surfaces [rad] and sigma_T [-] as they are."""
-    air = air_data(state, geometric)
-    coefficients = aerodynamic_coefficients(air, state, surfaces)
+def state_rate(
+    state: State, surfaces: Surfaces, throttle: float, time: float, truth: Truth
+) -> State:
+    """Rates of the 13 states, eqs 2.1-2.14, with surfaces [rad] and sigma_T [-] as they are.
+
+    `truth` is what sets the true vehicle apart from the nominal one, at `time` [s].
+    """
+    air = air_data(state, truth.geometric)
+    nominal = aerodynamic_coefficients(air, state, surfaces)
+    coefficients = disperse_coefficients(nominal, truth.dispersion)
     aero = loads(air, coefficients, centre_of_gravity(state.mass))
     total = Loads(aero.Fx + throttle * MAXIMUM_THRUST, aero.Fy, aero.Fz, aero.L, aero.M, aero.N)
     mass_rate = -throttle * MAXIMUM_THRUST / (SPECIFIC_IMPULSE * GRAVITY)  # eq 2.6
-    return motion(state, total, mass_rate, inertia(state.mass))
+    body = disperse_inertia(inertia(state.mass), truth.dispersion)
+    rate = motion(state, total, mass_rate, body)
+    d_P, d_Q, d_R = disturbance_acceleration(
+        truth.disturbance, time, state.P, state.Q, state.R
+    )  # eq 4.2
+    return State(
+        rate.u,
+        rate.v,
+        rate.w,
+        rate.P + d_P,
+        rate.Q + d_Q,
+        rate.R + d_R,
+        rate.phi,
+        rate.theta,
+        rate.psi,
+        rate.x,
+        rate.y,
+        rate.h,
+        rate.mass,
+    )
 
 
 @elementwise
@@ -40,13 +71,16 @@ def along(state: State, rate: State, time: float) -> State:
 
 
 @elementwise
-def vehicle_step(state: State, surfaces: Surfaces, throttle: float, geometric: bool) -> State:
-    """The state 0.01 s later: fourth-order Runge-Kutta, controls held within their stops."""
+def vehicle_step(
+    state: State, surfaces: Surfaces, throttle: float, time: float, truth: Truth
+) -> State:
+    """The state 0.01 s after `time` [s]: Runge-Kutta of fourth order, controls held."""
     held = limit_surfaces(surfaces)
     power = limit_throttle(throttle)
-    k1 = state_rate(state, held, power, geometric)
-    k2 = state_rate(along(state, k1, 0.5 * STEP), held, power, geometric)
-    k3 = state_rate(along(state, k2, 0.5 * STEP), held, power, geometric)
-    k4 = state_rate(along(state, k3, STEP), held, power, geometric)
+    half = 0.5 * STEP
+    k1 = state_rate(state, held, power, time, truth)
+    k2 = state_rate(along(state, k1, half), held, power, time + half, truth)
+    k3 = state_rate(along(state, k2, half), held, power, time + half, truth)
+    k4 = state_rate(along(state, k3, STEP), held, power, time + STEP, truth)
     ends = along(along(state, k1, STEP / 6.0), k4, STEP / 6.0)
     return along(along(ends, k2, STEP / 3.0), k3, STEP / 3.0)

@@ -19,19 +19,19 @@ from test.test_messages import message_of
 def whole(tmp_path_factory):
     """Bag of a short flight."""
     path = tmp_path_factory.mktemp("whole") / "bag"
-    fly_library(load_case("nominal_di", duration=1.0), path)
+    fly_library(load_case("nominal_di", {"duration": 1.0}), path)
     return path
 
 
 def test_a_library_bag_gives_the_flight_back(whole):
-    case = load_case("nominal_di", duration=1.0)
+    case = load_case("nominal_di", {"duration": 1.0})
     flown, computed = read_bag(whole), record(fly(case), False)
     for name in ("stamps", "states", "attitude_commands", "rate_commands", "surfaces", "throttle"):
         assert np.array_equal(getattr(flown, name), getattr(computed, name)), name
 
 
 def test_the_bag_knows_which_altitude_was_flown(tmp_path):
-    case = load_case("nominal_di", duration=0.1)
+    case = load_case("nominal_di", {"duration": 0.1})
     case.parameters["plant"]["geometric_altitude"] = True
     fly_library(case, tmp_path / "bag")
     assert read_bag(tmp_path / "bag").geometric

@@ -1,12 +1,15 @@
 """A case file is a ROS parameter file; what is wrong with it is said in one sentence."""
 
+import math
+
 import pytest
 
 from ahv_analysis.case import case_names, config_folder, load_case
 from ahv_msgs_py.parameters import ParameterError
 from ahv_plant.constants import RADIANS
+from ahv_plant.dispersion import NOMINAL
 
-NOMINAL = (config_folder() / "cases" / "nominal_di.yaml").read_text()
+TEXT = (config_folder() / "cases" / "nominal_di.yaml").read_text()
 
 
 def test_nominal_case_is_section_3_5_2():
@@ -22,9 +25,12 @@ def test_nominal_case_is_section_3_5_2():
     assert (start.P, start.Q, start.R) == (3 * RADIANS, 2 * RADIANS, -3 * RADIANS)
     assert (start.phi, start.theta, start.psi) == (0.0, 2.94 * RADIANS, 0.0)
     assert case.plant.steps == 15000
-    assert case.control.outer == (24000.0, 0.01)
+    assert case.control.outer == (24000.0, 0.01, math.pi)
     assert case.control.intermediate == (0.2, 0.2, 0.2)
-    assert case.control.inner == (2.0, 2.0, 2.0, False)
+    assert case.control.inner.tracking.gain == (2.0, 2.0, 2.0)
+    assert case.control.inner.tracking.exponent == 1.0
+    assert case.control.learner is None
+    assert case.plant.truth == NOMINAL
     assert case.control.velocity == (1786.4, 0.01, False)
 
 
@@ -34,15 +40,17 @@ def test_every_case_of_the_package_loads(name):
 
 
 def test_duration_replaces_that_of_the_file():
-    assert load_case("nominal_di", duration=1.5).plant.steps == 150
+    assert load_case("nominal_di", {"duration": 1.5}).plant.steps == 150
 
 
 def test_shared_parameters_reach_every_node_that_knows_them(tmp_path):
     path = tmp_path / "geometric.yaml"
-    path.write_text(NOMINAL.replace("geometric_altitude: false", "geometric_altitude: true"))
+    path.write_text(TEXT.replace("geometric_altitude: false", "geometric_altitude: true"))
     case = load_case(str(path))
     assert (
-        case.plant.geometric and case.control.inner.geometric and case.control.velocity.geometric
+        case.plant.truth.geometric
+        and case.control.inner.geometric
+        and case.control.velocity.geometric
     )
 
 
@@ -68,12 +76,12 @@ def test_shared_parameters_reach_every_node_that_knows_them(tmp_path):
 )
 def test_a_wrong_case_is_named(tmp_path, change, words):
     path = tmp_path / "wrong.yaml"
-    assert change[0] in NOMINAL
-    path.write_text(NOMINAL.replace(*change))
+    assert change[0] in TEXT
+    path.write_text(TEXT.replace(*change))
     with pytest.raises(ParameterError) as error:
         load_case(str(path))
     sentence = str(error.value)
-    assert "wrong.yaml" in sentence or "plant" in sentence
+    assert "wrong" in sentence or "plant" in sentence
     assert all(word in sentence for word in words), sentence
     assert "\n" not in sentence
 

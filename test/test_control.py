@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from ahv_control.inner_loop import InnerLoop, surface_command
+from ahv_control.error_dynamics import ErrorDynamics
+from ahv_control.inner_loop import InnerLoop, nominal_surfaces
 from ahv_control.intermediate_loop import IntermediateLoop, Rates, rate_command
 from ahv_control.newton_raphson import (
     SolverStatus,
@@ -23,6 +24,7 @@ from ahv_plant.constants import (
     THROTTLE_MAXIMUM,
     THROTTLE_MINIMUM,
 )
+from ahv_plant.dispersion import NOMINAL
 from ahv_plant.state import Surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import CRUISE, STATES, SURFACES, between, degrees
@@ -30,12 +32,18 @@ from test.flights import CRUISE, STATES, SURFACES, between, degrees
 NEUTRAL = Surfaces(0.0, 0.0, 0.0)
 
 
+def inner_loop(gains):
+    """Plain dynamic inversion with these gains."""
+    dynamics = ErrorDynamics(gains, Rates(1.0, 1.0, 1.0), 1.0)
+    return InnerLoop(dynamics, dynamics, Rates(15.0, 18.0, 15.0), False)
+
+
 @given(STATES, between(20000.0, 30000.0))
 def test_the_commanded_pitch_gives_the_commanded_climb(state, altitude):
     """Eq 3.1 with the plus sign: at theta*, h_dot = k_h (h* - h)."""
-    command = attitude_command(state, OuterLoop(altitude, 0.01))
+    command = attitude_command(state, OuterLoop(altitude, 0.01, math.pi))
     pitched = state._replace(theta=command.theta)
-    climb = state_rate(pitched, NEUTRAL, 0.2, False).h
+    climb = state_rate(pitched, NEUTRAL, 0.2, 0.0, NOMINAL).h
     assert climb == pytest.approx(0.01 * (altitude - state.h), abs=1e-8)
     assert (command.phi, command.psi) == (0.0, 0.0)
 
@@ -45,7 +53,7 @@ def test_the_commanded_rates_give_the_commanded_euler_rates(state, phi, theta, p
     gains = IntermediateLoop(0.1, 0.2, 0.3)
     command = rate_command(state, Attitude(phi, theta, psi), gains)
     turning = state._replace(P=command.P, Q=command.Q, R=command.R)
-    rate = state_rate(turning, NEUTRAL, 0.2, False)
+    rate = state_rate(turning, NEUTRAL, 0.2, 0.0, NOMINAL)
     expected = (0.1 * (phi - state.phi), 0.2 * (theta - state.theta), 0.3 * (psi - state.psi))
     assert (rate.phi, rate.theta, rate.psi) == pytest.approx(expected, abs=1e-12)
 
@@ -68,7 +76,7 @@ def test_the_surfaces_give_the_demanded_acceleration(state, P_dot, Q_dot, R_dot)
     solution = solve_surfaces(state, demand, Surfaces(-0.1, -0.1, 0.0), False)
     assert all(SURFACE_MINIMUM <= value <= SURFACE_MAXIMUM for value in solution.surfaces)
     if solution.status == SolverStatus.CONVERGED:
-        rate = state_rate(state, solution.surfaces, 0.2, False)
+        rate = state_rate(state, solution.surfaces, 0.2, 0.0, NOMINAL)
         assert pytest.approx(demand, abs=1e-9) == (rate.P, rate.Q, rate.R)
 
 
@@ -106,12 +114,12 @@ def test_the_rate_error_decays_at_the_gains(P, Q, R, P_command, Q_command, R_com
     """Section 3.3 on the nominal vehicle: e_dot + K e = 0."""
     state = CRUISE._replace(P=P, Q=Q, R=R)
     command = Rates(P_command, Q_command, R_command)
-    gains = InnerLoop(1.0, 2.0, 1.5, False)
-    solution = surface_command(state, command, Surfaces(-0.1, -0.1, 0.0), gains)
+    gains = inner_loop(Rates(1.0, 2.0, 1.5))
+    solution = nominal_surfaces(state, command, Surfaces(-0.1, -0.1, 0.0), gains)
     assert solution.status == SolverStatus.CONVERGED
-    rate = state_rate(state, solution.surfaces, 0.2, False)
+    rate = state_rate(state, solution.surfaces, 0.2, 0.0, NOMINAL)
     error = np.array(command) - (P, Q, R)
-    assert pytest.approx(np.array(gains[:3]) * error, abs=1e-9) == (rate.P, rate.Q, rate.R)
+    assert pytest.approx(np.array((1.0, 2.0, 1.5)) * error, abs=1e-9) == (rate.P, rate.Q, rate.R)
 
 
 @given(STATES, SURFACES, between(1700.0, 1900.0))
@@ -119,7 +127,7 @@ def test_the_throttle_gives_the_commanded_acceleration(state, surfaces, speed):
     """Eq 3.2: with sigma_T between its stops, u_dot = k_u (u* - u)."""
     throttle = throttle_command(state, surfaces, VelocityLoop(speed, 0.01, False))
     assert THROTTLE_MINIMUM <= throttle <= THROTTLE_MAXIMUM
-    rate = state_rate(state, surfaces, throttle, False).u
+    rate = state_rate(state, surfaces, throttle, 0.0, NOMINAL).u
     wanted = 0.01 * (speed - state.u)
     if throttle == THROTTLE_MINIMUM:
         assert rate > wanted - 1e-9
@@ -133,10 +141,12 @@ def test_at_trim_the_loops_ask_for_trim():
     from ahv_plant.trim import trim
 
     found = trim()
-    attitude = attitude_command(found.state, OuterLoop(24000.0, 0.01))
+    attitude = attitude_command(found.state, OuterLoop(24000.0, 0.01, math.pi))
     assert attitude.theta * DEGREES == pytest.approx(2.9442, abs=1e-4)
     rates = rate_command(found.state, attitude, IntermediateLoop(0.2, 0.2, 0.2))
-    solution = surface_command(found.state, rates, found.surfaces, InnerLoop(2.0, 2.0, 2.0, False))
+    solution = nominal_surfaces(
+        found.state, rates, found.surfaces, inner_loop(Rates(2.0, 2.0, 2.0))
+    )
     assert solution.surfaces == pytest.approx(found.surfaces, abs=1e-9)
     throttle = throttle_command(
         found.state, solution.surfaces, VelocityLoop(found.state.u, 0.01, False)

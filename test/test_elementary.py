@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ahv_plant.elementary import asin, atan, exp_small, log_near_one, sin_cos
+from ahv_plant.elementary import asin, atan, exp_small, log_near_one, power, sin_cos
 from test.flights import between
 
 
@@ -54,9 +54,19 @@ def test_logarithm(x):
         assert abs(log_near_one(x) - float(mpmath.log(x))) < 1e-16
 
 
-@given(between(-3.0, 3.0))
+@given(between(-10.0, 10.0))
 def test_exponential(x):
-    assert exp_small(x) == pytest.approx(math.exp(x), rel=4e-15, abs=0)
+    assert exp_small(x) == pytest.approx(math.exp(x), rel=2e-14, abs=0)
+
+
+@given(between(0.01, 1.0), between(-2.0, 2.0))
+def test_power(x, p):
+    assert power(x, p) == pytest.approx(x**p, rel=5e-14, abs=0)
+
+
+@given(between(0.01, 1.0))
+def test_power_zero_is_exactly_one(x):
+    assert power(x, 0.0) == 1.0
 
 
 def test_not_a_number_stays_one():

@@ -12,12 +12,12 @@ from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag_reader import read_bag
 from ahv_analysis.bag_writer import BagError
-from ahv_analysis.case import load_case
+from ahv_analysis.case import case_names, load_case
 from ahv_analysis.flight import fly, fly_library
 from ahv_analysis.graph_flight import GraphError, fly_graph
 from ahv_analysis.record import record
 from ahv_msgs_py.parameters import ParameterError
-from ahv_msgs_py.topics import CLOCK, LOOP_TOPICS, ODOMETRY, STATE
+from ahv_msgs_py.topics import CLOCK, LOOP_TOPICS, NOMINAL_TOPICS, ODOMETRY, STATE
 from ahv_plant.state import State
 
 STEPS = 15000
@@ -39,14 +39,30 @@ def same_bits(one, other):
 
 def test_graph_and_library_agree_to_the_last_bit(nominal):
     case = load_case("nominal_di")
-    flown, computed = read_bag(nominal), record(fly(case), case.plant.geometric)
+    flown, computed = read_bag(nominal), record(fly(case), case.plant.truth.geometric)
     assert flown.steps == STEPS
     for name in ARRAYS:
         assert same_bits(getattr(flown, name), getattr(computed, name)), name
 
 
-def test_graph_and_library_write_the_same_messages(tmp_path, domain):
-    case = load_case("nominal_di", duration=1.0)
+@pytest.mark.parametrize("name", case_names())
+def test_every_case_flies_on_the_graph_as_in_the_library(name, tmp_path, domain):
+    case = load_case(name, {"duration": 20.0})
+    ended_early, _ = fly_graph(case, tmp_path / "bag", domain=domain)
+    flown, computed = read_bag(tmp_path / "bag"), record(fly(case), False)
+    assert bool(ended_early) == (flown.steps < case.plant.steps)
+    for array in ARRAYS:
+        assert same_bits(getattr(flown, array), getattr(computed, array)), array
+    for array in ("learner", "estimates"):
+        if case.control.learner is None:
+            assert getattr(flown, array) is None
+        else:
+            assert same_bits(getattr(flown, array), getattr(computed, array)), array
+
+
+@pytest.mark.parametrize("name", ["nominal_di", "neuro_adaptive_di"])
+def test_graph_and_library_write_the_same_messages(name, tmp_path, domain):
+    case = load_case(name, {"duration": 1.0})
     fly_graph(case, tmp_path / "graph", domain=domain)
     fly_library(case, tmp_path / "library")
 
@@ -64,7 +80,7 @@ def test_graph_and_library_write_the_same_messages(tmp_path, domain):
 
 def test_the_bag_is_complete_in_rosbags(nominal):
     store = get_typestore(Stores.ROS2_JAZZY)
-    stamps = {topic.name: [] for topic in LOOP_TOPICS}
+    stamps = {topic.name: [] for topic in NOMINAL_TOPICS}
     with Reader(nominal) as reader:
         for connection, time, data in reader.messages():
             message = store.deserialize_cdr(data, connection.msgtype)
@@ -77,8 +93,8 @@ def test_the_bag_is_complete_in_rosbags(nominal):
 
 
 def test_the_bag_is_complete_in_mcap(nominal):
-    stamps = {topic.name: [] for topic in LOOP_TOPICS}
-    schemas = {topic.name: topic.layout.type_name for topic in LOOP_TOPICS}
+    stamps = {topic.name: [] for topic in NOMINAL_TOPICS}
+    schemas = {topic.name: topic.layout.type_name for topic in NOMINAL_TOPICS}
     with open(next(nominal.glob("*.mcap")), "rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for schema, channel, message, decoded in reader.iter_decoded_messages():
@@ -135,7 +151,7 @@ def test_nominal_flight_is_as_section_3_5_2_describes_it(nominal):
 
 
 def test_a_graph_leaves_nothing_behind(tmp_path, domain):
-    case = load_case("nominal_di", duration=0.2)
+    case = load_case("nominal_di", {"duration": 0.2})
     fly_graph(case, None, domain=domain)  # what a process loads once
     threads = threading.active_count()
     for number in range(3):
@@ -147,7 +163,10 @@ def test_a_graph_leaves_nothing_behind(tmp_path, domain):
 
 
 def test_two_graphs_of_one_process_do_not_meet(tmp_path, domain):
-    cases = [load_case("nominal_di", duration=0.5), load_case("nominal_di", duration=0.7)]
+    cases = [
+        load_case("nominal_di", {"duration": 0.5}),
+        load_case("nominal_di", {"duration": 0.7}),
+    ]
     flights = [
         threading.Thread(
             target=fly_graph, args=(case, tmp_path / str(n)), kwargs={"domain": domain + n}
@@ -162,17 +181,17 @@ def test_two_graphs_of_one_process_do_not_meet(tmp_path, domain):
 
 
 def test_a_vehicle_that_leaves_the_atmosphere_ends_the_flight(tmp_path, domain):
-    case = load_case("nominal_di", duration=20.0)
-    case.parameters["plant"] |= {"initial.h": 50.0, "initial.theta": -30.0, "initial.w": 0.0}
+    dive = {"initial.h": 50.0, "initial.theta": -30.0, "initial.w": 0.0}
+    case = load_case("nominal_di", dive | {"duration": 20.0})
     ended_early, _ = fly_graph(case, tmp_path / "bag", domain=domain)
     assert "atmosphere" in ended_early
     flown = read_bag(tmp_path / "bag")
     assert 0 < flown.steps < 100
-    assert flown.column("h")[-1] < 0.0
+    assert 0.0 < flown.column("h")[-1] < 20.0
 
 
 def test_a_bag_is_never_overwritten(tmp_path, domain):
-    case = load_case("nominal_di", duration=0.1)
+    case = load_case("nominal_di", {"duration": 0.1})
     fly_graph(case, tmp_path / "bag", domain=domain)
     before = read_bag(tmp_path / "bag").states
     with pytest.raises(ParameterError, match="exists already"):
@@ -186,4 +205,4 @@ def test_a_silent_graph_is_reported(domain, monkeypatch):
     monkeypatch.setattr("ahv_analysis.graph_flight.LONGEST_SILENCE", 0.5)
     monkeypatch.setattr("ahv_control.velocity_node.VelocityNode._answer", lambda *arguments: None)
     with pytest.raises(GraphError, match="stopped at step 0"):
-        fly_graph(load_case("nominal_di", duration=0.1), None, domain=domain)
+        fly_graph(load_case("nominal_di", {"duration": 0.1}), None, domain=domain)

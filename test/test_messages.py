@@ -8,9 +8,20 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 
+from ahv_control.disturbance_learner import Basis, start_learner
+from ahv_control.intermediate_loop import Rates
+from ahv_control.learner_message import estimate_values, learned_of, learner_values
 from ahv_msgs_py.base_node import message_class
 from ahv_msgs_py.layout import MessageError, clock_bytes
-from ahv_msgs_py.topics import LOOP_TOPICS, STATE, STATE_NAMES, SURFACE_COMMAND, SURFACE_NAMES
+from ahv_msgs_py.topics import (
+    BASIS_NAMES,
+    LEARNER_NAMES,
+    LOOP_TOPICS,
+    STATE,
+    STATE_NAMES,
+    SURFACE_COMMAND,
+    SURFACE_NAMES,
+)
 from ahv_plant.state import State, Surfaces
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -31,6 +42,9 @@ def message_of(topic, stamp, values):
     if topic.layout.type_name == "sensor_msgs/msg/JointState":
         message.name = list(topic.layout.fields)
         message.position = list(values)
+    elif topic.layout.type_name == "geometry_msgs/msg/AccelStamped":
+        linear, angular = message.accel.linear, message.accel.angular
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = values
     else:
         message.vector.x, message.vector.y, message.vector.z = values
     return message
@@ -39,6 +53,16 @@ def message_of(topic, stamp, values):
 def test_names_are_those_of_the_vehicle():
     assert State._fields == STATE_NAMES
     assert Surfaces._fields == SURFACE_NAMES
+    assert Basis._fields == BASIS_NAMES
+    assert len(learner_values(start_learner(Rates(1.0, 2.0, 3.0)))) == len(LEARNER_NAMES)
+    assert LEARNER_NAMES[:6] == ("X_a.P", "X_a.Q", "X_a.R", "X_d.P", "X_d.Q", "X_d.R")
+
+
+def test_the_learner_comes_back_from_its_messages():
+    values = tuple(float(number) for number in range(len(LEARNER_NAMES)))
+    learned = learned_of(values, (0.0, 0.0, 0.0, 7.0, 8.0, 9.0))
+    assert learned == ((0.0, 1.0, 2.0), (3.0, 4.0, 5.0), (7.0, 8.0, 9.0))
+    assert estimate_values(learned.estimate) == (0.0, 0.0, 0.0, 7.0, 8.0, 9.0)
 
 
 @TOPICS

@@ -15,6 +15,7 @@ from ahv_control.newton_raphson import angular_response, flight_condition, solve
 from ahv_control.intermediate_loop import Rates
 from ahv_plant import aerodynamic_fits, elementary
 from ahv_plant.atmosphere import atmosphere
+from ahv_plant.dispersion import AxisDisturbance, Disturbance, Truth, draw_dispersion
 from ahv_plant.state import State, Surfaces
 from ahv_plant.vehicle import state_rate, vehicle_step
 
@@ -41,24 +42,27 @@ for name in names:
         for _ in range(300)
     ))
 for name, low, high in (("sin_cos", -50, 50), ("atan", -30, 30), ("asin", -1.2, 1.2),
-                        ("log_near_one", 0.7, 1.4), ("exp_small", -3, 3)):
+                        ("log_near_one", 0.7, 1.4), ("exp_small", -9, 9)):
     function = getattr(elementary, name)
     show(name, tuple(function(draw.uniform(low, high)) for _ in range(3000)))
 for geometric in (False, True):
     show("atmosphere", tuple(atmosphere(draw.uniform(-1e3, 5e4), geometric) for _ in range(3000)))
-for _ in range(100):
+axis = AxisDisturbance(*(draw.uniform(-0.5, 0.5) for _ in AxisDisturbance._fields))
+for run in range(100):
+    truth = Truth(run % 2 == 1, draw_dispersion(0.4, 3, run), Disturbance(axis, axis, axis))
     state = State(*(draw.uniform(low, high) for low, high in (
         (1300, 4000), (-80, 80), (-100, 250), (-.2, .2), (-.2, .2), (-.2, .2), (-1, 1), (-.5, .5),
         (-3, 3), (-1e5, 1e5), (-1e5, 1e5), (15000, 40000), (80000, 140000))))
     surfaces = Surfaces(*(draw.uniform(-0.6, 0.5) for _ in range(3)))
     demand = Rates(*(draw.uniform(-0.5, 0.5) for _ in range(3)))
-    show("rate", state_rate(state, surfaces, 0.3, False))
-    show("step", vehicle_step(state, surfaces, 0.3, True))
+    show("rate", state_rate(state, surfaces, 0.3, 5.0, truth))
+    show("step", vehicle_step(state, surfaces, 0.3, 5.0, truth))
     show("jacobian", angular_response(flight_condition(state, False), surfaces))
+    show("power", elementary.power(draw.uniform(0.01, 1.0), draw.uniform(-2.0, 2.0)))
     show("solver", solve_surfaces(state, demand, surfaces, False))
 for case in {cases!r}:
-    for step in fly(load_case(case, duration=2.0)):
-        show(case, (step.state, step.commands))
+    for step in fly(load_case(case, {"duration": 2.0})):
+        show(case, (step.state, step.commands, step.learner or ()))
 """
 
 
@@ -75,8 +79,8 @@ def run(cases, **environment):
 
 
 def test_plain_floats_and_compiled_code_agree_in_every_bit():
-    cases = ["nominal_di"]
+    cases = ["nominal_di", "neuro_adaptive_di", "neuro_adaptive_sc_gdi_protected"]
     compiled = run(cases, NUMBA_DISABLE_JIT="0")
     plain = run(cases, NUMBA_DISABLE_JIT="1")
-    assert len(compiled) == 22 + 5 + 2 + 400 + 201 * len(cases)
+    assert len(compiled) == 22 + 5 + 2 + 500 + 201 * len(cases)
     assert compiled == plain

@@ -1,0 +1,22 @@
+"""The learner's state and estimate as the values of their messages, and back."""
+
+from collections.abc import Sequence
+
+from ahv_control.disturbance_learner import LearnerState
+from ahv_control.inner_loop import Learned
+from ahv_control.intermediate_loop import Rates
+
+
+def learner_values(learner: LearnerState) -> tuple[float, ...]:
+    """39 values in the order of `LEARNER_NAMES`."""
+    return (*learner.X_a, *learner.X_d, *learner.W_P, *learner.W_Q, *learner.W_R)
+
+
+def estimate_values(estimate: Rates) -> tuple[float, ...]:
+    """Six values of the acceleration message: no linear part, d-hat [rad/s^2] as angular part."""
+    return 0.0, 0.0, 0.0, *estimate
+
+
+def learned_of(learner: Sequence[float], estimate: Sequence[float]) -> Learned:
+    """What the inner loop takes from the two messages."""
+    return Learned(Rates(*learner[0:3]), Rates(*learner[3:6]), Rates(*estimate[3:6]))
