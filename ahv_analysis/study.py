@@ -6,12 +6,17 @@ counted is the barrier's doing, the loss of vehicles, and how well rates follow 
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from math import isfinite
+from pathlib import Path
 from typing import NamedTuple
 
 import numba
+import numpy as np
+from matplotlib import pyplot
 
 from ahv_analysis.case import load_case
+from ahv_analysis.figures import STYLE
+from ahv_analysis.flight import fly
+from ahv_analysis.record import record
 from ahv_control.disturbance_learner import (
     LearnerSettings,
     LearnerState,
@@ -31,7 +36,12 @@ from ahv_control.intermediate_loop import Rates
 from ahv_control.newton_raphson import nominal_response
 from ahv_plant.constants import DEGREES, RADIANS, STEP, UNSTART_ALPHA
 from ahv_plant.departure import departure
-from ahv_plant.dispersion import Dispersion, Truth, draw_dispersion
+from ahv_plant.dispersion import (
+    Dispersion,
+    Truth,
+    disturbance_acceleration,
+    draw_dispersion,
+)
 from ahv_plant.elementary import atan
 from ahv_plant.state import State, Surfaces
 from ahv_plant.vehicle import vehicle_step
@@ -47,7 +57,6 @@ class Outcome(NamedTuple):
     """What became of one flight."""
 
     steps: int  # flown before |alpha| > 5 deg, a departure, or the end
-    finite: bool  # the state was still a number then
     largest_error: float  # [deg/s] largest |X - X_a| of any channel
     following: float  # [deg/s] root mean square of X - X_d
     roughness: float  # [deg] mean change of a surface per step
@@ -86,15 +95,15 @@ def explicit_step(
 @numba.njit(error_model="numpy", nogil=True)
 def fly_study(
     state: State, settings: FlightControl, truth: Truth, explicit: bool, steps: int
-) -> tuple[int, float, float, float, float]:
-    """Fly until the end or the loss of the vehicle; fields of `Outcome`, and the last |alpha|."""
+) -> tuple[int, float, float, float]:
+    """Fly until the end or the loss of the vehicle; sums for `Outcome`."""
     learner = first_learner(state)
     answer = adaptive_control(state, learner, NEUTRAL, settings)
-    largest, follow, rough, alpha = 0.0, 0.0, 0.0, 0.0
+    largest, follow, rough = 0.0, 0.0, 0.0
     for step in range(steps):
         alpha = abs(atan(state.w / state.u))
         if not alpha <= UNSTART_ALPHA or departure(state, truth.geometric) != 0:
-            return step, largest, follow, rough, alpha
+            return step, largest, follow, rough
         later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
         before = answer.surfaces
         step_learner = (learner, state, before, answer.rates)
@@ -115,18 +124,17 @@ def fly_study(
             + abs(now.left_elevon - before.left_elevon)
             + abs(now.rudder - before.rudder)
         )
-    return steps, largest, follow, rough, alpha
+    return steps, largest, follow, rough
 
 
 def outcome(
     state: State, settings: FlightControl, truth: Truth, explicit: bool = False, steps: int = STEPS
 ) -> Outcome:
     """Fly one flight of a study."""
-    flown, largest, follow, rough, alpha = fly_study(state, settings, truth, explicit, steps)
+    flown, largest, follow, rough = fly_study(state, settings, truth, explicit, steps)
     count = max(flown, 1)
     return Outcome(
         flown,
-        isfinite(alpha) and alpha < 1.0,
         largest * DEGREES,
         (follow / count) ** 0.5 * DEGREES,
         rough / (3 * count) * DEGREES,
@@ -187,7 +195,7 @@ def row(*cells: object) -> None:
 def study_barrier(state: State, settings: FlightControl, levels: Sequence[float]) -> None:
     """Explicit against implicit weight update."""
     print(f"\nBarrier: {RUNS} vehicles a level, seed {SEED}\n")
-    row("level", "step", "within 5 deg", "diverged", "largest error in k_b")
+    row("level", "step", "within 5 deg", "beyond k_b", "largest error in k_b")
     row(*["---"] * 5)
     k_b = settings.learner.k_b
     for level in levels:
@@ -197,7 +205,7 @@ def study_barrier(state: State, settings: FlightControl, levels: Sequence[float]
                 level,
                 "explicit" if explicit else "implicit",
                 sum(flight.steps == STEPS for flight in found),
-                sum(not flight.finite for flight in found),
+                sum(flight.largest_error >= k_b for flight in found),
                 max(flight.largest_error for flight in found) / k_b,
             )
     print("\nThe hard vehicle:\n")
@@ -230,8 +238,51 @@ def study_settings(
         )
 
 
+KINDS = {
+    "constant": {"disturbance.Q.constant": 1.0},
+    "sine": {"disturbance.Q.amplitude": 1.0, "disturbance.Q.frequency": 0.5},
+    "state-dependent": {
+        "disturbance.Q.constant": 0.3,
+        "disturbance.Q.Q": -0.8,
+        "disturbance.Q.Q2": 0.3,
+    },
+}
+
+
+def draw_learning(path: Path) -> None:
+    """Draw d-hat beside the true d(t, X) of the pitch channel, and its error, in flight."""
+    undispersed = {f"dispersion.{name}": 1.0 for name in Dispersion._fields}
+    start = {"initial.Q": 3.0, "duration": 20.0}
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(2, len(KINDS), sharex=True, figsize=(9.6, 4.2))
+        for column, (kind, changes) in zip(axes.T, KINDS.items(), strict=True):
+            case = load_case("neuro_adaptive_di", undispersed | start | changes)
+            flight = record(fly(case), False)
+            assert flight.estimates is not None
+            rates = flight.states[:, 3:6]
+            true = [
+                disturbance_acceleration(case.plant.truth.disturbance, time, *rate)[1]
+                for time, rate in zip(flight.time.tolist(), rates.tolist(), strict=True)
+            ]
+            estimate, actual = flight.estimates[:, 1] * DEGREES, np.array(true) * DEGREES
+            column[0].plot(flight.time, actual, color="0.55", label="$d$")
+            column[0].plot(flight.time, estimate, color="C0", label=r"$\hat d$")
+            column[0].set_title(kind, fontsize=9)
+            column[1].plot(flight.time, estimate - actual, color="C3")
+            column[1].set_ylim(-0.3, 0.3)
+            column[1].set_xlabel("time [s]")
+        axes[0, 0].set_ylabel("disturbance [deg/s$^2$]")
+        axes[1, 0].set_ylabel(r"$\hat d - d$ [deg/s$^2$]")
+        axes[0, 0].legend(frameon=False)
+        figure.tight_layout()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=120)
+        pyplot.close(figure)
+
+
 def main() -> None:
-    """Print all studies as Markdown tables."""
+    """Draw the learning and print all studies as Markdown tables."""
+    draw_learning(Path("docs/figures/learning.png"))
     case = load_case("neuro_adaptive_di")
     settings, start = case.control, case.plant.initial
     study_barrier(start, settings, (0.3, 0.4, 0.5))
