@@ -1,5 +1,6 @@
 """Package `ahv`: built by colcon as ament_python, and by pip into a virtual environment."""
 
+import sys
 from glob import glob
 
 from setuptools import setup
@@ -8,10 +9,20 @@ NAME = "ahv"
 NODES = {
     "plant": "ahv_plant.plant_node",
     "outer_intermediate": "ahv_control.outer_intermediate_node",
+    "disturbance_learner": "ahv_control.disturbance_learner_node",
     "inner_loop": "ahv_control.inner_loop_node",
     "velocity": "ahv_control.velocity_node",
     "recorder": "ahv_analysis.recorder_node",
 }
+DATA = [
+    ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+    (f"share/{NAME}", ["package.xml"]),
+    *((f"share/{NAME}/{folder}", glob(f"{folder}/*.yaml")) for folder in glob("config/*")),
+    (f"share/{NAME}/launch", glob("launch/*.launch.py")),
+]
+if "bdist_wheel" in sys.argv:
+    # `ros2 run` looks in lib/ahv: pip puts launchers there, colcon the nodes themselves
+    DATA.append((f"lib/{NAME}", [f"resource/nodes/{node}" for node in NODES]))
 
 setup(
     name=NAME,
@@ -20,12 +31,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=["ahv_plant", "ahv_control", "ahv_msgs_py", "ahv_analysis"],
-    data_files=[
-        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
-        (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/config/cases", glob("config/cases/*.yaml")),
-        (f"share/{NAME}/launch", glob("launch/*.launch.py")),
-    ],
+    data_files=DATA,
     install_requires=[
         "setuptools",
         "numpy",  # arrays of flights
@@ -40,7 +46,15 @@ setup(
     extras_require={
         # ROS itself where there is no ROS installation; a ROS machine brings its own
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
-        "test": ["pytest", "hypothesis", "mcap", "mcap-ros2-support", "mpmath", "ruff"],
+        "test": [
+            "pytest",
+            "hypothesis",
+            "mcap",
+            "mcap-ros2-support",
+            "mpmath",
+            "ruff",
+            "setuptools>=70.1",  # builds a wheel without help
+        ],
     },
     entry_points={
         "console_scripts": [

@@ -3,20 +3,23 @@
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from enum import StrEnum
-from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
-from ahv_analysis.bag_writer import BagError
-from ahv_msgs_py.parameters import ParameterError
+from ahv_analysis.campaign_command import monte_carlo, table
+from ahv_analysis.console import (
+    HIGHEST_LEVEL,
+    Json,
+    UsageError,
+    console,
+    number_option,
+    one_sentence,
+    progress_bar,
+    show_table,
+)
 from ahv_plant.constants import DEGREES, INITIAL_MASS, STEP
 from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED
 
@@ -27,9 +30,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-console = Console()
-HIGHEST_LEVEL = 0.9  # [-] of a drawn dispersion
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+app.add_typer(monte_carlo, name="monte-carlo")
+app.command()(table)
 
 
 class Engine(StrEnum):
@@ -39,61 +41,12 @@ class Engine(StrEnum):
     library = "library"
 
 
-def number(text: str) -> float:
-    """Read an option that is a number."""
-    try:
-        return float(text)
-    except ValueError:
-        raise typer.BadParameter(f"{text!r} is not a number") from None
-
-
-def _number(unit: str, meaning: str) -> Any:
-    return typer.Option(help=f"{meaning} [{unit}].", parser=number, metavar="NUMBER")
-
-
-class UsageError(Exception):
-    """Something asked for that cannot be had; one sentence, exit code 2."""
-
-
-def one_sentence(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn the errors of wrong input into one sentence and exit code 2."""
-
-    @wraps(command)
-    def guarded(*arguments: Any, **options: Any) -> None:
-        try:
-            command(*arguments, **options)
-        except (UsageError, ParameterError, BagError) as error:
-            print(f"ahv: {error}", file=sys.stderr)
-            raise typer.Exit(2) from error
-
-    return guarded
-
-
-@contextmanager
-def progress_bar(title: str, total: int, hidden: bool) -> Iterator[Callable[[int], None]]:
-    """Progress on the terminal; the function it gives takes the work done so far."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f}%"))
-    with Progress(
-        *columns, TimeRemainingColumn(), console=console, disable=hidden, transient=True
-    ) as bar:
-        task = bar.add_task(title, total=total)
-        yield lambda done: bar.update(task, completed=done)
-
-
-def table(title: str, rows: list[tuple[str, str]]) -> None:
-    """Print a table of names and values."""
-    sheet = Table(title=title, title_justify="left", show_header=False)
-    for name, value in rows:
-        sheet.add_row(name, value)
-    console.print(sheet)
-
-
 @app.command()
 @one_sentence
 def trim(
-    altitude: Annotated[float, _number("m", "Altitude")] = CRUISE_ALTITUDE,
-    speed: Annotated[float, _number("m/s", "Forward speed u")] = CRUISE_SPEED,
-    mass: Annotated[float, _number("kg", "Mass")] = INITIAL_MASS,
+    altitude: Annotated[float, number_option("m", "Altitude")] = CRUISE_ALTITUDE,
+    speed: Annotated[float, number_option("m/s", "Forward speed u")] = CRUISE_SPEED,
+    mass: Annotated[float, number_option("kg", "Mass")] = INITIAL_MASS,
     geometric: Annotated[
         bool, typer.Option("--geometric", help="The altitude is geometric, not geopotential.")
     ] = False,
@@ -128,7 +81,7 @@ def trim(
             (name, f"{value:.6g}" if isinstance(value, float) else str(value))
             for name, value in values.items()
         ]
-        table(f"Trim at {altitude:g} m, {speed:g} m/s, {mass:g} kg", rows)
+        show_table(f"Trim at {altitude:g} m, {speed:g} m/s, {mass:g} kg", rows)
     if not found.converged:
         print("ahv: no trim was found: the solver did not converge", file=sys.stderr)
         raise typer.Exit(1)
@@ -146,7 +99,7 @@ def fly(
         typer.Option(help="Folder for the bag and the summary, which must not have them."),
     ] = None,
     duration: Annotated[
-        float | None, _number("s", "Length of the flight, instead of the case's")
+        float | None, number_option("s", "Length of the flight, instead of the case's")
     ] = None,
     dispersion: Annotated[
         str | None,
@@ -230,31 +183,42 @@ def _print_summary(summary: dict[str, Any]) -> None:
         ("pace", f"{summary['real_time_factor']:.0f} times real time"),
         ("bag", summary["bag"]),
     ]
-    table(f"{summary['case']} on the {summary['engine']}", rows)
+    show_table(f"{summary['case']} on the {summary['engine']}", rows)
 
 
 @app.command()
 @one_sentence
 def figures(
-    bag: Annotated[Path, typer.Argument(help="Folder of a bag.")],
+    source: Annotated[Path, typer.Argument(help="Folder of a bag, or of a campaign.")],
     out: Annotated[Path, typer.Option(help="Folder for the figures.")],
+    runs: Annotated[int, typer.Option(min=1, help="Runs of a campaign to draw.")] = 100,
+    level: Annotated[
+        float | None, typer.Option(help="Level of a campaign, if there are several.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Draw the report's figures of a recorded flight, as PNG and SVG.
+    """Draw the report's figures of a flight or a campaign, as PNG and SVG.
 
-    3.2-3.7 of a nominal one; 4.1-4.5 or 5.1-5.5 of an adaptive one, beside the nominal law.
+    3.2-3.7 of a nominal flight; 4.1-4.5 or 5.1-5.5 of an adaptive one, beside the nominal law;
+    3.8-3.13, 4.6-4.10 or 5.6-5.10 of a campaign.
     """
-    from ahv_analysis.comparison import report_figures
+    from ahv_analysis.campaign import campaign_file, open_campaign, read_runs
     from ahv_analysis.figures import save_figures
+    from ahv_analysis.report_figures import bag_figures, campaign_figures
 
-    plates, flights = report_figures(bag)
+    if any(source.glob("runs-*.parquet")):
+        campaign = open_campaign(source, level)
+        found, _ = read_runs(campaign_file(campaign, source))
+        plates, draw = campaign_figures(campaign, found["cause"].tolist(), runs)
+    else:
+        plates, draw = bag_figures(source)
     try:
-        with progress_bar("drawing", len(plates), as_json) as progress:
-            written = save_figures(plates, flights, out, progress)
+        with progress_bar("drawing", len(plates), as_json, unit="figures") as progress:
+            written = save_figures(plates, draw, out, progress)
     except OSError as error:
         raise UsageError(f"cannot write figures to {out}: {error}") from error
     if as_json:
-        print(json.dumps({"bag": str(bag), "figures": [str(path) for path in written]}))
+        print(json.dumps({"source": str(source), "figures": [str(path) for path in written]}))
     else:
         console.print(f"{len(written)} files in {out}")
 

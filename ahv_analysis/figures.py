@@ -105,7 +105,7 @@ CONTROLS = (
         Panel(r"$\sigma_T$ [-]", lambda record: record.throttle),
     ),
 )
-# Figures of a chapter, from its first number on.
+# Figures of a chapter, from its first number on; of single flights, then of campaigns.
 CHAPTER_3 = tuple(
     Plate(f"3.{number}", *subject)
     for number, subject in enumerate((AIR, VELOCITY, PATH, ATTITUDE, RATES, CONTROLS), 2)
@@ -126,6 +126,15 @@ FLOWN, NOMINAL, ACTUAL, ADAPTIVE = (
 )
 COLOURS = {FLOWN: "C0", NOMINAL: "0.55", ACTUAL: "C3", ADAPTIVE: "C0"}
 COMMAND_STYLE = {"color": "C0", "alpha": 0.6, "linestyle": "--", "linewidth": 1.0}
+
+CAMPAIGN_3, CAMPAIGN_4, CAMPAIGN_5 = (
+    tuple(Plate(f"{chapter}.{number}", *subject) for number, subject in enumerate(subjects, first))
+    for chapter, first, subjects in (
+        (3, 8, (AIR, VELOCITY, PATH, ATTITUDE, RATES, CONTROLS)),
+        (4, 6, (AIR, PATH, ATTITUDE, RATES, CONTROLS)),
+        (5, 6, (AIR, PATH, ATTITUDE, RATES, CONTROLS)),
+    )
+)
 
 TUMBLING = 20.0 / DEGREES  # [rad] angle of attack at which a vehicle is lost
 STYLE = {
@@ -191,6 +200,43 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
     return figure
 
 
+def draw_campaign(plate: Plate, flights: Sequence[FlightRecord], failed: Sequence[bool]) -> Figure:
+    """One figure with a thin line per run, the failed ones in red on top."""
+    with pyplot.rc_context(STYLE):
+        figure, axes = pyplot.subplots(
+            len(plate.panels), 1, sharex=True, figsize=(6.4, 1.9 * len(plate.panels) + 0.6)
+        )
+        for panel, axis in zip(plate.panels, axes, strict=True):
+            seen = []
+            for record, lost in zip(flights, failed, strict=True):
+                values = panel.values(record)
+                shown = slice(_flying(record) if lost else None)
+                colour, level = ("C3", 3) if lost else ("C0", 2)
+                axis.plot(
+                    record.time[shown],
+                    values[shown],
+                    color=colour,
+                    lw=0.6,
+                    alpha=0.7,
+                    zorder=level,
+                )
+                if not lost:
+                    seen.append(values)
+            if seen:
+                _scale(axis, np.concatenate(seen), panel.bound)
+            if panel.bound is not None:
+                for bound in (-panel.bound, panel.bound):
+                    axis.axhline(bound, color="0.4", linestyle=":", linewidth=1.0)
+            axis.set_ylabel(panel.label)
+        axes[-1].set_xlabel("time [s]")
+        axes[-1].margins(x=0)
+        title = f"Figure {plate.number}: {plate.title}, {len(flights)} runs, {sum(failed)} failed"
+        figure.suptitle(title, fontsize=10, x=0.02, ha="left")
+        figure.align_ylabels(axes)
+        figure.tight_layout()
+    return figure
+
+
 def _flying(record: FlightRecord) -> int:
     """Number of states until the vehicle tumbled."""
     tumbling = np.abs(record.air.alpha) > TUMBLING
@@ -213,7 +259,7 @@ def _scale(axis: pyplot.Axes, values: Array, bound: float | None) -> None:
 
 def save_figures(
     plates: Sequence[Plate],
-    flights: Mapping[str, FlightRecord],
+    draw_plate: Callable[[Plate], Figure],
     folder: Path,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Path]:
@@ -221,7 +267,7 @@ def save_figures(
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for done, plate in enumerate(plates, 1):
-        figure = draw(plate, flights)
+        figure = draw_plate(plate)
         for kind in ("png", "svg"):
             path = folder / f"figure_{plate.number.replace('.', '_')}.{kind}"
             metadata = {"Date": None} if kind == "svg" else None

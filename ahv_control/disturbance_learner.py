@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
 from ahv_control.intermediate_loop import Rates
-from ahv_plant.compiled import elementwise
+from ahv_plant.compiled import elementwise, select
 from ahv_plant.constants import DEGREES, RADIANS, STEP
 
 
@@ -156,8 +156,8 @@ def barrier_step(
     is left after a fixed number of steps errs towards less learning.
     """
     a = (1.0 + STEP * k_ap) * k_b
-    b = STEP * STEP * strength / k_b
-    size = -innovation if innovation < 0.0 else innovation
+    b = STEP * STEP * strength * (1.0 / k_b)
+    size = select(innovation < 0.0, -innovation, innovation)
     y = size / (a + b)
     y = _newton_towards(y, a, b, size)
     y = _newton_towards(y, a, b, size)
@@ -165,17 +165,16 @@ def barrier_step(
     y = _newton_towards(y, a, b, size)
     y = _newton_towards(y, a, b, size)
     s = 2.0 * y / (1.0 + sqrt(1.0 + 4.0 * y * y))
-    sign = -1.0 if innovation < 0.0 else 1.0
-    return sign * s * k_b, sign * y / k_b
+    sign = select(innovation < 0.0, -1.0, 1.0)
+    return sign * s * k_b, sign * y * (1.0 / k_b)
 
 
 @elementwise
 def _newton_towards(y: float, a: float, b: float, size: float) -> float:
     """One Newton step of a s(y) + b y = size, where s = 2 y / (1 + sqrt(1 + 4 y^2))."""
     root = sqrt(1.0 + 4.0 * y * y)
-    s = 2.0 * y / (1.0 + root)
-    slope = 2.0 / (root * (1.0 + root))
-    return y + (size - a * s - b * y) / (a * slope + b)
+    scale = root * (1.0 + root)
+    return y + ((size - b * y) * scale - 2.0 * a * y * root) / (2.0 * a + b * scale)
 
 
 @elementwise

@@ -14,7 +14,7 @@ everywhere.
 from typing import NamedTuple
 
 from ahv_control.intermediate_loop import Rates
-from ahv_plant.compiled import elementwise
+from ahv_plant.compiled import elementwise, select
 from ahv_plant.elementary import power
 
 FLOOR = 0.1  # [-] least value of 1 - e^2 / k_s^2 that the gain follows
@@ -31,9 +31,9 @@ class ErrorDynamics(NamedTuple):
 @elementwise
 def decay(error: float, gain: float, bound: float, exponent: float) -> float:
     """e_dot [rad/s^2] of one channel, eq 5.11."""
-    ratio = error / bound
+    ratio = error * (1.0 / bound)
     room = 1.0 - ratio * ratio
-    room = room if room > FLOOR else FLOOR
+    room = select(room > FLOOR, room, FLOOR)
     return -gain * power(room, 1.0 - exponent) * error
 
 

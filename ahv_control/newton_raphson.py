@@ -13,7 +13,7 @@ from ahv_plant.aerodynamics import (
     control_coefficients,
     loads,
 )
-from ahv_plant.compiled import elementwise
+from ahv_plant.compiled import elementwise, select
 from ahv_plant.mass_properties import Inertia, centre_of_gravity, inertia
 from ahv_plant.rigid_body import angular_acceleration
 from ahv_plant.state import State, Surfaces, limit_surfaces
@@ -78,6 +78,7 @@ def angular_response(
 ) -> tuple[Rates, Rates, Rates, Rates]:
     """f(X, U) of eq 2.3 [rad/s^2]; its slopes by right elevon, left elevon and rudder [1/s^2]."""
     air, body, rates = condition.air, condition.body, condition.rates
+    per_Ixx, per_Iyy, per_Izz = 1.0 / body.Ixx, 1.0 / body.Iyy, 1.0 / body.Izz
     increments, by_right, by_left, by_rudder = control_coefficients(air, surfaces)
     total = loads(air, add_coefficients(condition.clean, increments), condition.X_cg)
     right = loads(air, by_right, condition.X_cg)
@@ -88,9 +89,9 @@ def angular_response(
     )
     return (
         Rates(P_dot, Q_dot, R_dot),
-        Rates(right.L / body.Ixx, right.M / body.Iyy, right.N / body.Izz),
-        Rates(left.L / body.Ixx, left.M / body.Iyy, left.N / body.Izz),
-        Rates(rudder.L / body.Ixx, rudder.M / body.Iyy, rudder.N / body.Izz),
+        Rates(right.L * per_Ixx, right.M * per_Iyy, right.N * per_Izz),
+        Rates(left.L * per_Ixx, left.M * per_Iyy, left.N * per_Izz),
+        Rates(rudder.L * per_Ixx, rudder.M * per_Iyy, rudder.N * per_Izz),
     )
 
 
@@ -118,10 +119,10 @@ def newton_step(condition: FlightCondition, demand: Rates, now: Iterate) -> Iter
     missing = Rates(demand.P - response.P, demand.Q - response.Q, demand.R - response.R)
     det = determinant(right, left, rudder)
     regular = det * det > SINGULAR_DETERMINANT * SINGULAR_DETERMINANT
-    scale = 1.0 / (det if regular else 1.0)
-    d_right = determinant(missing, left, rudder) * scale if regular else 0.0
-    d_left = determinant(right, missing, rudder) * scale if regular else 0.0
-    d_rudder = determinant(right, left, missing) * scale if regular else 0.0
+    scale = 1.0 / select(regular, det, 1.0)
+    d_right = select(regular, determinant(missing, left, rudder) * scale, 0.0)
+    d_left = select(regular, determinant(right, missing, rudder) * scale, 0.0)
+    d_rudder = select(regular, determinant(right, left, missing) * scale, 0.0)
     return Iterate(
         Surfaces(
             now.surfaces.right_elevon + d_right,
@@ -129,7 +130,7 @@ def newton_step(condition: FlightCondition, demand: Rates, now: Iterate) -> Iter
             now.surfaces.rudder + d_rudder,
         ),
         max(abs(d_right), abs(d_left), abs(d_rudder)),
-        now.regular and regular,
+        now.regular & regular,
     )
 
 
@@ -146,18 +147,18 @@ def solve_surfaces(state: State, demand: Rates, previous: Surfaces, geometric: b
     last = newton_step(condition, demand, last)
     last = newton_step(condition, demand, last)
     solved = last.correction < CORRECTION_TOLERANCE
-    usable = last.regular and last.correction < 1.0  # not a number compares false
+    usable = last.regular & (last.correction < 1.0)  # not a number compares false
     held = limit_surfaces(last.surfaces)
     surfaces = Surfaces(
-        held.right_elevon if usable else previous.right_elevon,
-        held.left_elevon if usable else previous.left_elevon,
-        held.rudder if usable else previous.rudder,
+        select(usable, held.right_elevon, previous.right_elevon),
+        select(usable, held.left_elevon, previous.left_elevon),
+        select(usable, held.rudder, previous.rudder),
     )
     free = (
-        held.right_elevon == last.surfaces.right_elevon
-        and held.left_elevon == last.surfaces.left_elevon
-        and held.rudder == last.surfaces.rudder
+        (held.right_elevon == last.surfaces.right_elevon)
+        & (held.left_elevon == last.surfaces.left_elevon)
+        & (held.rudder == last.surfaces.rudder)
     )
     # SolverStatus as plain numbers: singular 3, iteration limit 2, saturated 1, converged 0.
-    status = (0 if free else 1) if solved else 2
-    return Solution(surfaces, status if last.regular else 3)
+    status = select(solved, select(free, 0, 1), 2)
+    return Solution(surfaces, select(last.regular, status, 3))

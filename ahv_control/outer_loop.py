@@ -4,7 +4,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ahv_plant.compiled import elementwise
-from ahv_plant.elementary import asin, atan, sin_cos
+from ahv_plant.elementary import asin, atan_ratio, sin_cos
 from ahv_plant.state import State, clamp
 
 
@@ -38,7 +38,7 @@ def attitude_command(state: State, settings: OuterLoop) -> Attitude:
     sin_phi, cos_phi = sin_cos(state.phi)
     B = state.v * sin_phi + state.w * cos_phi
     climb = settings.k_h * (settings.altitude - state.h)
-    alpha = atan(B / state.u)  # in the vertical plane
+    alpha = atan_ratio(B, state.u)  # in the vertical plane
     theta = alpha + asin(climb / sqrt(state.u * state.u + B * B))
     climb_angle = state.theta - alpha
     limit = settings.alpha_limit

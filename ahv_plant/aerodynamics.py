@@ -30,7 +30,7 @@ from ahv_plant.aerodynamic_fits import (
 from ahv_plant.atmosphere import atmosphere
 from ahv_plant.compiled import elementwise
 from ahv_plant.constants import DEGREES, MEAN_CHORD, WING_AREA, WING_SPAN
-from ahv_plant.elementary import atan
+from ahv_plant.elementary import atan_ratio
 from ahv_plant.state import State, Surfaces
 
 MACH_MINIMUM = 4.0  # [-] the fits hold above
@@ -75,15 +75,16 @@ def air_data(state: State, geometric: bool) -> AirData:
     """Air data of a state (section 2.1); `geometric` says which altitude h is."""
     air = atmosphere(state.h, geometric)
     in_plane = sqrt(state.u * state.u + state.w * state.w)
+    per_in_plane = 1.0 / in_plane
     speed = sqrt(state.u * state.u + state.v * state.v + state.w * state.w)
     return AirData(
         speed,
-        atan(state.w / state.u),
-        atan(state.v / in_plane),  # = asin(v / V_t)
+        atan_ratio(state.w, state.u),
+        atan_ratio(state.v, in_plane),  # = asin(v / V_t)
         speed / air.sound_speed,
         0.5 * air.density * speed * speed,
-        state.w / in_plane,
-        state.u / in_plane,
+        state.w * per_in_plane,
+        state.u * per_in_plane,
     )
 
 
@@ -92,9 +93,10 @@ def clean_coefficients(air: AirData, state: State) -> Coefficients:
     """Return what no surface changes of the coefficients: basic, sideslip and damping parts."""
     a = air.alpha * DEGREES
     m = air.mach
-    p_hat = state.P * WING_SPAN / (2.0 * air.speed)
-    q_hat = state.Q * MEAN_CHORD / (2.0 * air.speed)
-    r_hat = state.R * WING_SPAN / (2.0 * air.speed)
+    per_speed = 0.5 / air.speed
+    p_hat = state.P * WING_SPAN * per_speed
+    q_hat = state.Q * MEAN_CHORD * per_speed
+    r_hat = state.R * WING_SPAN * per_speed
     return Coefficients(
         CL_basic(a, m),
         CD_basic(a, m),

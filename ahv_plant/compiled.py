@@ -1,9 +1,10 @@
 """One source, three ways to run it: plain floats, compiled scalars, and lanes of a vector loop.
 
-A function marked `elementwise` takes and returns floats or named tuples of floats, and uses only +
-- * / sqrt, comparisons and selects, which IEEE 754 rounds alike everywhere. Fastmath is off, so no
-operation is contracted or reordered, and all three ways give the same bits. The environment
-variable NUMBA_DISABLE_JIT=1 runs the very same source as plain Python.
+A function marked `elementwise` takes and returns floats or named tuples of floats. It uses only
+`+ - * / sqrt abs max`, comparisons with `&` and `|`, and `select`, which IEEE 754 rounds alike
+everywhere; no `if`, `and` or `or` on numbers, which lanes could not follow each its own way.
+Fastmath is off, so no operation is contracted or reordered, and all three ways give the same bits.
+NUMBA_DISABLE_JIT=1 runs the very same source as plain Python, `ahv_plant.lanes` in lanes.
 """
 
 import hashlib
@@ -14,7 +15,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba import types
 from numba.core import config
+from numba.extending import overload
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -27,7 +30,7 @@ def _source_hash() -> str:
     """
     house = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for room in ("ahv_plant", "ahv_control"):
+    for room in ("ahv_plant", "ahv_control", "ahv_analysis"):
         for source in sorted((house / room).glob("*.py")):
             digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()[:16]
@@ -53,8 +56,29 @@ def _numba_cache_in(directory: Path):
 
 def elementwise(function: Function) -> Function:
     """Compile `function` of scalars, with IEEE division and a cache that notices new sources."""
-    dispatcher = numba.njit(function, error_model="numpy")
+    return _compile(function, forceinline=True)
+
+
+def kernel(function: Function) -> Function:
+    """Compile a loop over elementwise functions, which runs beside others in threads."""
+    return _compile(function, nogil=True)
+
+
+def _compile(function: Function, **options: bool) -> Function:
+    dispatcher = numba.njit(function, error_model="numpy", **options)
     if not config.DISABLE_JIT:
         with _numba_cache_in(_CACHE):
             dispatcher.enable_caching()
     return dispatcher
+
+
+def select(condition: Any, chosen: Any, other: Any) -> Any:
+    """`chosen` where `condition` holds, else `other`: the conditional expression of lanes."""
+    return chosen if condition else other
+
+
+@overload(select)
+def _compile_select(condition, chosen, other):
+    if condition == types.boolean:
+        return lambda condition, chosen, other: chosen if condition else other
+    return None

@@ -3,7 +3,7 @@
 from enum import IntEnum
 
 from ahv_plant.atmosphere import ALTITUDE_MAXIMUM, ALTITUDE_MINIMUM, geopotential_altitude
-from ahv_plant.compiled import elementwise
+from ahv_plant.compiled import elementwise, select
 from ahv_plant.state import State
 
 
@@ -22,8 +22,8 @@ def departure(state: State, geometric: bool) -> int:
     total = state.u + state.v + state.w + state.P + state.Q + state.R
     total = total + state.phi + state.theta + state.psi + state.x + state.y + H + state.mass
     finite = total - total == 0.0
-    inside = H >= ALTITUDE_MINIMUM and H <= ALTITUDE_MAXIMUM
-    return (0 if inside else 2) if finite else 1
+    inside = (H >= ALTITUDE_MINIMUM) & (H <= ALTITUDE_MAXIMUM)
+    return select(finite, select(inside, 0, 2), 1)
 
 
 def departure_reason(state: State, geometric: bool, time: float) -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ahv_plant.aerodynamics import Coefficients
-from ahv_plant.compiled import elementwise
+from ahv_plant.compiled import elementwise, select
 from ahv_plant.elementary import sin_cos
 from ahv_plant.mass_properties import Inertia
 
@@ -94,7 +94,7 @@ def disperse_inertia(nominal: Inertia, by: Dispersion) -> Inertia:
 def axis_disturbance(axis: AxisDisturbance, time: float, P: float, Q: float, R: float) -> float:
     """d_i(t, X) [rad/s^2] of one axis at `time` [s] and the body rates [rad/s]."""
     sine, _ = sin_cos(axis.frequency * time)
-    stepped = axis.step if time >= axis.step_time else 0.0
+    stepped = select(time >= axis.step_time, axis.step, 0.0)
     with_rates = P * (axis.P + axis.P2 * P) + Q * (axis.Q + axis.Q2 * Q)
     with_rates = with_rates + R * (axis.R + axis.R2 * R)
     return axis.constant + stepped + axis.amplitude * sine + with_rates

@@ -16,10 +16,11 @@ def angular_acceleration(
 
     With I_xz = 0, c2 = c4 = c6 = 0 and the others are the quotients below.
     """
-    c1 = (body.Iyy - body.Izz) / body.Ixx
-    c5 = (body.Izz - body.Ixx) / body.Iyy
-    c8 = (body.Ixx - body.Iyy) / body.Izz
-    return c1 * Q * R + L / body.Ixx, c5 * P * R + M / body.Iyy, c8 * P * Q + N / body.Izz
+    return (
+        ((body.Iyy - body.Izz) * Q * R + L) / body.Ixx,
+        ((body.Izz - body.Ixx) * P * R + M) / body.Iyy,
+        ((body.Ixx - body.Iyy) * P * Q + N) / body.Izz,
+    )
 
 
 @elementwise
@@ -32,13 +33,14 @@ def motion(state: State, total: Loads, mass_rate: float, body: Inertia) -> State
     sin_psi, cos_psi = sin_cos(state.psi)
     P_dot, Q_dot, R_dot = angular_acceleration(P, Q, R, total.L, total.M, total.N, body)
     psi_dot = (Q * sin_phi + R * cos_phi) / cos_theta
+    per_mass = 1.0 / state.mass
     down = v * sin_phi + w * cos_phi  # velocity along the vertical plane's normal to u
     across = v * cos_phi - w * sin_phi
     ahead = u * cos_theta + down * sin_theta
     return State(
-        R * v - Q * w - GRAVITY * sin_theta + total.Fx / state.mass,
-        P * w - R * u + GRAVITY * cos_theta * sin_phi + total.Fy / state.mass,
-        Q * u - P * v + GRAVITY * cos_theta * cos_phi + total.Fz / state.mass,
+        R * v - Q * w - GRAVITY * sin_theta + total.Fx * per_mass,
+        P * w - R * u + GRAVITY * cos_theta * sin_phi + total.Fy * per_mass,
+        Q * u - P * v + GRAVITY * cos_theta * cos_phi + total.Fz * per_mass,
         P_dot,
         Q_dot,
         R_dot,

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ahv_plant.compiled import elementwise
+from ahv_plant.compiled import elementwise, select
 from ahv_plant.constants import (
     SURFACE_MAXIMUM,
     SURFACE_MINIMUM,
@@ -44,8 +44,8 @@ class Surfaces(NamedTuple):
 @elementwise
 def clamp(value: float, lower: float, upper: float) -> float:
     """Limit `value` to [lower, upper]."""
-    value = lower if value < lower else value
-    return upper if value > upper else value
+    value = select(value < lower, lower, value)
+    return select(value > upper, upper, value)
 
 
 @elementwise

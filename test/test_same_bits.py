@@ -58,7 +58,7 @@ for run in range(100):
     show("rate", state_rate(state, surfaces, 0.3, 5.0, truth))
     show("step", vehicle_step(state, surfaces, 0.3, 5.0, truth))
     show("jacobian", angular_response(flight_condition(state, False), surfaces))
-    show("power", elementary.power(draw.uniform(0.01, 1.0), draw.uniform(-2.0, 2.0)))
+    show("power", elementary.power(draw.uniform(0.08, 1.0), draw.uniform(-2.0, 2.0)))
     show("solver", solve_surfaces(state, demand, surfaces, False))
 for case in {cases!r}:
     for step in fly(load_case(case, {"duration": 2.0})):

@@ -1,0 +1,98 @@
+"""What the commands share: tables, progress, numbers, and errors in one sentence."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+from rich.text import Text
+
+from ahv_analysis.bag_writer import BagError
+from ahv_msgs_py.parameters import ParameterError
+
+console = Console()
+HIGHEST_LEVEL = 0.9  # [-] of a drawn dispersion
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+def number(text: str) -> float:
+    """Read an option that is a number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not a number") from None
+
+
+def number_option(unit: str, meaning: str) -> Any:
+    """Return an option that is a number of a unit."""
+    return typer.Option(help=f"{meaning} [{unit}].", parser=number, metavar="NUMBER")
+
+
+class UsageError(Exception):
+    """Something asked for that cannot be had; one sentence, exit code 2."""
+
+
+def one_sentence(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn the errors of wrong input into one sentence and exit code 2."""
+
+    @wraps(command)
+    def guarded(*arguments: Any, **options: Any) -> None:
+        from ahv_analysis.campaign import CampaignError
+
+        try:
+            command(*arguments, **options)
+        except (UsageError, ParameterError, BagError, CampaignError) as error:
+            print(f"ahv: {error}", file=sys.stderr)
+            raise typer.Exit(2) from error
+
+    return guarded
+
+
+class _RateColumn(ProgressColumn):
+    """Work done a second."""
+
+    def __init__(self, unit: str):
+        super().__init__()
+        self._unit = unit
+
+    def render(self, task: Task) -> Text:
+        """Show the rate once there is one."""
+        return Text(f"{task.speed:.0f} {self._unit}/s" if task.speed else "")
+
+
+@contextmanager
+def progress_bar(
+    title: str, total: int, hidden: bool, unit: str = "steps"
+) -> Iterator[Callable[[int], None]]:
+    """Progress on the terminal; the function it gives takes the work done so far."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        _RateColumn(unit),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, disable=hidden, transient=True) as bar:
+        task = bar.add_task(title, total=total)
+        yield lambda done: bar.update(task, completed=done)
+
+
+def show_table(title: str, rows: list[tuple[str, str]]) -> None:
+    """Print a table of names and values."""
+    sheet = Table(title=title, title_justify="left", show_header=False)
+    for name, value in rows:
+        sheet.add_row(name, value)
+    console.print(sheet)

@@ -1,0 +1,72 @@
+"""Which figures of the report a bag or a campaign is for, and the flights that they show."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from ahv_analysis.bag_reader import read_bag, read_notes
+from ahv_analysis.block import fly_trajectory
+from ahv_analysis.campaign import Campaign
+from ahv_analysis.case import Case, make_case
+from ahv_analysis.figures import (
+    ACTUAL,
+    ADAPTIVE,
+    CAMPAIGN_3,
+    CAMPAIGN_4,
+    CAMPAIGN_5,
+    CHAPTER_3,
+    CHAPTER_4,
+    CHAPTER_5,
+    FLOWN,
+    NOMINAL,
+    Plate,
+    draw,
+    draw_campaign,
+)
+from ahv_analysis.flight import fly
+from ahv_analysis.record import FlightRecord, record
+from ahv_plant.dispersion import Truth
+
+DRAWN_EVERY = 10  # steps between the points of a campaign's lines
+
+
+def bag_figures(bag: Path) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
+    """Which figures of the report a bag is for, and how to draw one.
+
+    For an adaptive flight the nominal law is flown from the same start, on the nominal vehicle and
+    on the actual one, with the parameters that the bag holds.
+    """
+    flown = read_bag(bag)
+    notes = read_notes(bag)
+    if notes is None or flown.learner is None:
+        return CHAPTER_3, partial(draw, flights={FLOWN: flown})
+    case = make_case(notes["case"], notes["parameters"])
+    nominal = case._replace(control=case.control._replace(learner=None))
+    ideal = nominal._replace(plant=case.plant._replace(truth=Truth(case.plant.truth.geometric)))
+    plates = CHAPTER_4 if case.control.inner.tracking.exponent == 1.0 else CHAPTER_5
+    flights = {NOMINAL: _fly(ideal), ACTUAL: _fly(nominal), ADAPTIVE: flown}
+    return plates, partial(draw, flights=flights)
+
+
+def _fly(case: Case) -> FlightRecord:
+    return record(fly(case), case.plant.truth.geometric)
+
+
+def campaign_figures(
+    campaign: Campaign, causes: Sequence[int], runs: int
+) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
+    """Which figures a campaign is for, and how to draw one with its first `runs` runs.
+
+    The runs are flown again, so that a campaign of any size keeps no trajectory.
+    """
+    cases = [campaign.case_of(run) for run in range(min(runs, len(causes)))]
+    flights = [fly_trajectory(case, DRAWN_EVERY) for case in cases]
+    failed = [causes[run] != 0 for run in range(len(flights))]
+    control = campaign.case.control
+    if control.learner is None:
+        plates = CAMPAIGN_3
+    else:
+        plates = CAMPAIGN_4 if control.inner.tracking.exponent == 1.0 else CAMPAIGN_5
+    return plates, partial(draw_campaign, flights=flights, failed=failed)

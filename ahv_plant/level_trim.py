@@ -1,0 +1,72 @@
+"""Does a vehicle have a trim at all? Level flight found by the few numbers that it takes, in lanes."""
+
+from typing import NamedTuple
+
+from ahv_plant.compiled import elementwise, select
+from ahv_plant.constants import (
+    MAXIMUM_THRUST,
+    SURFACE_MAXIMUM,
+    SURFACE_MINIMUM,
+    THROTTLE_MAXIMUM,
+    THROTTLE_MINIMUM,
+)
+from ahv_plant.dispersion import Truth
+from ahv_plant.elementary import sin_cos
+from ahv_plant.state import State, Surfaces
+from ahv_plant.vehicle import state_rate
+
+DIFFERENCE = 1e-6  # [rad] of the finite-difference Jacobian
+TOLERANCE = 1e-6  # [m/s^2, rad/s^2] of a trim
+
+
+class LevelTrim(NamedTuple):
+    """Symmetric level flight."""
+
+    alpha: float  # [rad] angle of attack and pitch
+    elevon: float  # [rad] both elevons
+    throttle: float  # [-]
+    exists: bool  # found, with elevons and throttle inside their stops
+
+
+@elementwise
+def balance(
+    alpha: float, elevon: float, altitude: float, speed: float, mass: float, truth: Truth
+) -> tuple[float, float, float]:
+    """Rates of w, Q [m/s^2, rad/s^2] and the throttle that u needs, in level flight at `alpha`."""
+    sine, cosine = sin_cos(alpha)
+    state = State(
+        speed, 0.0, speed * sine / cosine, 0.0, 0.0, 0.0, 0.0, alpha, 0.0, 0.0, 0.0, altitude, mass
+    )
+    rate = state_rate(state, Surfaces(elevon, elevon, 0.0), 0.0, 0.0, truth)
+    return rate.w, rate.Q, -rate.u * mass / MAXIMUM_THRUST
+
+
+@elementwise
+def trim_step(
+    alpha: float, elevon: float, altitude: float, speed: float, mass: float, truth: Truth
+) -> tuple[float, float]:
+    """One Newton-Raphson step of the two equations w_dot = 0 and Q_dot = 0."""
+    w, Q, _ = balance(alpha, elevon, altitude, speed, mass, truth)
+    w_alpha, Q_alpha, _ = balance(alpha + DIFFERENCE, elevon, altitude, speed, mass, truth)
+    w_elevon, Q_elevon, _ = balance(alpha, elevon + DIFFERENCE, altitude, speed, mass, truth)
+    a, b = w_alpha - w, w_elevon - w
+    c, d = Q_alpha - Q, Q_elevon - Q
+    scale = DIFFERENCE / (a * d - b * c)
+    return alpha - (d * w - b * Q) * scale, elevon - (a * Q - c * w) * scale
+
+
+@elementwise
+def level_trim(altitude: float, speed: float, mass: float, truth: Truth) -> LevelTrim:
+    """Level flight at `altitude` [m] and u = `speed` [m/s] with equal elevons, section 3.5.1.
+
+    The seven equations in two unknowns: v, P, R and the rudder are zero by symmetry, pitch is the
+    angle of attack in level flight, and the throttle follows.
+    """
+    alpha, elevon = trim_step(0.05, -0.12, altitude, speed, mass, truth)
+    for _ in range(9):
+        alpha, elevon = trim_step(alpha, elevon, altitude, speed, mass, truth)
+    w, Q, throttle = balance(alpha, elevon, altitude, speed, mass, truth)
+    found = (abs(w) < TOLERANCE) & (abs(Q) < TOLERANCE)
+    held = (elevon >= SURFACE_MINIMUM) & (elevon <= SURFACE_MAXIMUM)
+    driven = (throttle >= THROTTLE_MINIMUM) & (throttle <= THROTTLE_MAXIMUM)
+    return LevelTrim(alpha, elevon, throttle, select(found & held & driven, 1.0, 0.0))

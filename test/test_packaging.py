@@ -1,0 +1,163 @@
+"""The package installs by pip and by colcon alike: executables, index, cases, launch file."""
+
+import os
+import runpy
+import shutil
+import subprocess
+import sys
+import zipfile
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from xml.etree import ElementTree
+
+import pytest
+
+from ahv_analysis.case import case_names
+from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
+
+ROOT = Path(__file__).parent.parent
+CONTROLLERS = ["outer_intermediate", "inner_loop", "velocity"]
+BUILT_FROM = ("package.xml", "setup.py", "setup.cfg", "pyproject.toml", "README.md", "LICENSE")
+BUILDS_WHEELS = find_spec("setuptools.command.bdist_wheel") or find_spec("wheel")
+
+
+@pytest.fixture
+def setup(monkeypatch):
+    """What setup.py hands to setuptools."""
+    given = {}
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr("setuptools.setup", lambda **options: given.update(options))
+    runpy.run_path("setup.py")
+    return given
+
+
+@pytest.fixture
+def manifest():
+    return ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+def executables(setup):
+    return dict(line.split(" = ") for line in setup["entry_points"]["console_scripts"])
+
+
+def test_every_executable_is_a_function(setup):
+    names = executables(setup)
+    assert {"ahv", "plant", "recorder", *CONTROLLERS} <= set(names)
+    for target in names.values():
+        module, function = target.split(":")
+        assert callable(getattr(import_module(module), function))
+
+
+def test_every_node_has_a_launcher(setup):
+    launchers = {path.name: path for path in (ROOT / "resource" / "nodes").iterdir()}
+    assert set(launchers) == set(executables(setup)) - {"ahv"}
+    for path in launchers.values():
+        assert os.access(path, os.X_OK), path
+        assert path.read_text() == launchers["plant"].read_text()
+
+
+def test_launcher_becomes_the_program_of_its_name(tmp_path):
+    launcher, program = tmp_path / "lib" / "ahv" / "plant", tmp_path / "bin" / "plant"
+    for path in (launcher, program):
+        path.parent.mkdir(parents=True)
+    shutil.copy(ROOT / "resource" / "nodes" / "plant", launcher)
+    program.write_text('#!/bin/sh\nprintf "%s," $$ "$@"\nexit 7\n')
+    program.chmod(0o755)
+    with subprocess.Popen([launcher, "-p", "two words"], stdout=subprocess.PIPE) as process:
+        assert process.stdout.read().decode() == f"{process.pid},-p,two words,"
+    assert process.returncode == 7
+
+
+@pytest.mark.skipif(not BUILDS_WHEELS, reason="this setuptools cannot build a wheel")
+def test_wheel_carries_what_ros_looks_for(setup, tmp_path):
+    for name in (*setup["packages"], "config", "launch", "resource"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in BUILT_FROM:
+        shutil.copy(ROOT / name, tmp_path)
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index"]
+    subprocess.run([*pip, "--no-build-isolation", "-w", tmp_path, tmp_path], check=True)
+    (path,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(path) as wheel:
+        modes = {info.filename: info.external_attr >> 16 for info in wheel.infolist()}
+    data = f"ahv-{setup['version']}.data/data"
+    for node in set(executables(setup)) - {"ahv"}:
+        assert modes[f"{data}/lib/ahv/{node}"] & 0o111 == 0o111
+    expected = ["ament_index/resource_index/packages/ahv", "ahv/package.xml"]
+    expected += [f"ahv/config/cases/{case}.yaml" for case in case_names()]
+    expected += ["ahv/launch/flight.launch.py"]
+    assert {f"{data}/share/{name}" for name in expected} <= set(modes)
+    assert not [name for name in modes if name.startswith("test")]
+
+
+def test_colcon_puts_the_nodes_themselves_where_pip_puts_launchers(setup):
+    assert "lib/ahv" not in dict(setup["data_files"])
+    assert "install_scripts=$base/lib/ahv" in (ROOT / "setup.cfg").read_text()
+    assert "pytest" in setup["extras_require"]["test"], "or `colcon test` runs nothing"
+
+
+def test_package_xml_says_what_setup_says(setup, manifest):
+    assert manifest.get("format") == "3"
+    assert manifest.findtext("name") == setup["name"] == "ahv"
+    assert manifest.findtext("version") == setup["version"]
+    assert manifest.findtext("license") == setup["license"] == "Apache-2.0"
+    assert manifest.findtext("export/build_type") == "ament_python"
+    assert "Version 2.0, January 2004" in (ROOT / "LICENSE").read_text()
+
+
+def test_package_xml_names_every_package_of_messages(manifest):
+    known = {element.text for element in manifest.iter("exec_depend")}
+    types = [topic.layout.type_name for topic in LOOP_TOPICS]
+    types += [topic.type_name for topic in VIEWER_TOPICS]
+    assert {name.split("/")[0] for name in types} <= known
+
+
+class Noted(SimpleNamespace):
+    """Stands for any class of ROS's launch, which cannot be had by pip: keeps its options."""
+
+    def __init__(self, *values, **options):
+        super().__init__(values=values, **options)
+
+    def perform(self, context):
+        return context[self.values[0]]
+
+
+@pytest.fixture
+def launch(monkeypatch):
+    """The launch file: what it starts for given arguments, as options of nodes by name."""
+    for name in ("launch", "launch.actions", "launch.substitutions", "launch_ros.actions"):
+        module = ModuleType(name)
+        module.__getattr__ = lambda _: Noted
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setitem(sys.modules, "launch_ros", ModuleType("launch_ros"))
+    monkeypatch.setattr(
+        "ament_index_python.packages.get_package_share_directory", lambda _: str(ROOT)
+    )
+    description = runpy.run_path(str(ROOT / "launch" / "flight.launch.py"))
+    *arguments, start = description["generate_launch_description"]().values[0]
+    defaults = {argument.values[0]: argument.default_value for argument in arguments}
+    return lambda **given: {node.name: node for node in start.function(defaults | given)}
+
+
+def test_launch_starts_a_process_per_node_from_one_case(launch, setup):
+    nodes = launch(bag="flights/one")
+    assert set(nodes) == {"recorder", "plant", *CONTROLLERS} <= set(executables(setup))
+    for name, node in nodes.items():
+        assert (node.package, node.executable, node.namespace) == ("ahv", name, "/ahv")
+        assert node.parameters[0] == str(ROOT / "config" / "cases" / "nominal_di.yaml")
+    assert nodes["recorder"].parameters[1:] == [{"bag": str(Path("flights/one").resolve())}]
+    assert nodes["plant"].parameters[1:] == [{"listeners": 4}]
+
+
+def test_launch_adds_the_learner_to_adaptive_cases(launch):
+    nodes = launch(case="neuro_adaptive_di")
+    assert set(nodes) == {"recorder", "plant", "disturbance_learner", *CONTROLLERS}
+    assert nodes["plant"].parameters[1:] == [{"listeners": 5}]
+
+
+def test_launch_takes_a_file_and_names_one_that_is_not_there(launch):
+    file = ROOT / "config" / "cases" / "nominal_di.yaml"
+    assert launch(case=str(file))["plant"].parameters[0] == str(file)
+    with pytest.raises(FileNotFoundError, match=r"case 'typo': there is no file .*typo\.yaml"):
+        launch(case="typo")
