@@ -9,7 +9,7 @@ PYTHON ?= $(shell for python in python3 python3.12 python3.11; do \
 OUT ?= flights/nominal_di-$(shell date +%Y%m%d-%H%M%S)
 BIN := .venv/bin
 READY := .venv/ready
-MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis test setup.py
+MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis launch test setup.py
 
 .PHONY: fly test bench venv clean
 

@@ -42,11 +42,15 @@ setup(
         "typer",  # the `ahv` command
         "rich",  # its tables and progress bars
         "pyyaml",  # case files
+        "pyarrow",  # campaigns as Parquet files
     ],
     extras_require={
         # ROS itself where there is no ROS installation; a ROS machine brings its own
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
+        # campaigns on a dask.distributed cluster
+        "dask": ["distributed"],
         "test": [
+            "distributed",
             "pytest",
             "hypothesis",
             "mcap",

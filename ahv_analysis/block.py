@@ -53,12 +53,13 @@ def fly_nominal(state, truth, control, steps):
     one = state.u
     answer = widen(nominal_control(state, NEUTRAL, control), one)
     tally = widen(START, one)
+    observed = widen(0.0, one)
     altitude = control.outer.altitude
     for step in range(steps):
-        tally = count_step(tally, state, answer, 0.0, altitude, truth.geometric)
+        tally = count_step(tally, state, answer, observed, altitude, truth.geometric)
         state = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
         answer = widen(nominal_control(state, answer.surfaces, control), one)
-    return count_step(tally, state, answer, 0.0, altitude, truth.geometric)
+    return count_step(tally, state, answer, observed, altitude, truth.geometric)
 
 
 @kernel

@@ -1,9 +1,9 @@
-"""Monte-Carlo campaigns: draws, flights on any executor, one row a run, resumed where they stopped."""
+"""Monte-Carlo campaigns: drawn flights on any executor, one row a run, resumed if stopped."""
 
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,29 +140,26 @@ def fly_campaign(
     the executor's to repeat. Interrupted by KeyboardInterrupt, the folder keeps what was flown.
     Raises CampaignError if the folder holds another campaign.
     """
-    table = read_campaign(campaign, folder)
-    done = set(table["run"].tolist()) if table else set()
+    before = _kept(campaign, folder)
+    done = set(before["run"].tolist()) if before else set()
     jobs = [
         (first, min(RUNS_PER_JOB, campaign.runs - first))
         for first in range(0, campaign.runs, RUNS_PER_JOB)
         if not done.issuperset(range(first, min(first + RUNS_PER_JOB, campaign.runs)))
     ]
-    flown = [table] if table else []
-    progress(len(done))
+    progress(min(len(done), campaign.runs))
     futures = [executor.submit(fly_runs, campaign, first, count) for first, count in jobs]
-    count = len(done)
+    count = min(len(done), campaign.runs)
     try:
         for number, future in enumerate(as_completed(futures), 1):
-            result = future.result()
-            flown.append(result)
-            count += len(result["run"])
+            count += len(future.result()["run"])
             progress(min(count, campaign.runs))
             if number % SAVE_EVERY == 0:
-                _write(campaign, folder, flown)
+                _write(campaign, folder, before, futures)
     finally:
         for future in futures:
             future.cancel()
-        _write(campaign, folder, flown)
+        _write(campaign, folder, before, futures)
     return read_campaign(campaign, folder)
 
 
@@ -173,14 +170,19 @@ def campaign_file(campaign: Campaign, folder: Path) -> Path:
 
 def read_campaign(campaign: Campaign, folder: Path) -> dict[str, Array]:
     """Columns flown so far, sorted by run, at most those of the campaign; {} if there are none."""
+    table = _kept(campaign, folder)
+    return {name: column[table["run"] < campaign.runs] for name, column in table.items()}
+
+
+def _kept(campaign: Campaign, folder: Path) -> dict[str, Array]:
+    """All columns that the folder holds of this campaign, of however many runs; {} if none."""
     path = campaign_file(campaign, folder)
     if not path.exists():
         return {}
     table, description = read_runs(path)
     if description != json.loads(json.dumps(campaign.describe())):
         raise CampaignError(f"{path} holds another campaign: choose another --out")
-    wanted = table["run"] < campaign.runs
-    return {name: column[wanted] for name, column in table.items()}
+    return table
 
 
 def read_runs(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
@@ -199,11 +201,10 @@ def open_campaign(folder: Path, level: float | None = None) -> Campaign:
     if level is not None:
         files = [path for path in files if path.stem == f"runs-{level:g}"]
     if len(files) != 1:
-        levels = ", ".join(
-            path.stem.removeprefix("runs-") for path in folder.glob("runs-*.parquet")
-        )
+        names = [path.stem.removeprefix("runs-") for path in sorted(folder.glob("runs-*.parquet"))]
         raise CampaignError(
-            f"{folder} holds {len(files)} campaigns to choose from; levels there: {levels or 'none'}"
+            f"{folder} holds {len(files)} campaigns to choose from by --level; "
+            f"there are: {', '.join(names) or 'none'}"
         )
     table, description = read_runs(files[0])
     case = make_case(description["case"], description["parameters"])
@@ -213,12 +214,20 @@ def open_campaign(folder: Path, level: float | None = None) -> Campaign:
     )
 
 
-def _write(campaign: Campaign, folder: Path, parts: Sequence[dict[str, Array]]) -> None:
-    """Write all parts as one file, sorted by run, whole or not at all."""
-    if not parts:
+def _write(
+    campaign: Campaign, folder: Path, before: dict[str, Array], futures: Sequence[Future[Any]]
+) -> None:
+    """Write what was there and what has been flown, sorted by run, whole or not at all."""
+    flown = [
+        future.result()
+        for future in futures
+        if future.done() and not future.cancelled() and future.exception() is None
+    ]
+    parts = [before, *flown] if before else flown
+    if not flown:
         return
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    runs, order = np.unique(joined["run"], return_index=True)
+    _, order = np.unique(joined["run"], return_index=True)
     table = pa.table({name: column[order] for name, column in joined.items()})
     table = table.replace_schema_metadata({"ahv": json.dumps(campaign.describe())})
     folder.mkdir(parents=True, exist_ok=True)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -15,6 +16,7 @@ from ahv_analysis.console import (
     HIGHEST_LEVEL,
     Json,
     UsageError,
+    integer_option,
     one_sentence,
     progress_bar,
     show_table,
@@ -50,9 +52,9 @@ def executor_of(workers: int, dask: str | None) -> Iterator[Executor]:
         yield pool
 
 
-Workers = Annotated[int, typer.Option(min=1, help="Threads.", show_default="one a core")]
+Workers = Annotated[int, integer_option("Threads, by default one a core.", 1)]
 Dask = Annotated[str | None, typer.Option(help="Address of a dask scheduler to fly on.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the draws.")]
+Seed = Annotated[int, integer_option("Seed of the draws.")]
 CORES = os.cpu_count() or 1
 
 
@@ -66,7 +68,7 @@ def fly(
     level: Annotated[
         list[float] | None, typer.Option(help="Dispersion; may be given several times.")
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, help="Vehicles a level.")] = 1000,
+    runs: Annotated[int, integer_option("Vehicles a level.", 1)] = 1000,
     seed: Seed = 0,
     protected: Annotated[
         bool, typer.Option("--protected", help="The case with angle-of-attack protection.")
@@ -125,8 +127,6 @@ def fly(
 
 def print_interrupted(done: int, runs: int) -> None:
     """Say what an interrupted campaign keeps."""
-    import sys
-
     print(
         f"ahv: interrupted after {done} of {runs} runs; the same command resumes", file=sys.stderr
     )
@@ -217,7 +217,7 @@ def rerun(
 @one_sentence
 def table(
     runs: Annotated[
-        int | None, typer.Option(min=1, help="Trials a cell, instead of the report's numbers.")
+        int | None, integer_option("Trials a cell, instead of the report's numbers.", 1)
     ] = None,
     seed: Seed = 0,
     protected: Annotated[

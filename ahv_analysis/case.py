@@ -23,7 +23,7 @@ from ahv_control.parameters import (
     outer_loop,
     velocity_loop,
 )
-from ahv_msgs_py.parameters import ParameterError, Value, check_parameters
+from ahv_msgs_py.parameters import SHARED, ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
 from ahv_plant.parameters import PLANT_PARAMETERS, PlantSettings, plant_settings
@@ -141,10 +141,11 @@ def _read(path: Path) -> dict[str, dict[str, object]]:
             raise ParameterError(f"{path.name}: {section} must hold a section ros__parameters")
         sections[section] = _flat(body["ros__parameters"])
     shared = sections.get(EVERY_NODE, {})
-    everywhere = {parameter.name for known in NODES.values() for parameter in known}
     for name in shared:
-        if name not in everywhere:
-            raise ParameterError(f"{path.name}: {EVERY_NODE}: no node has a parameter {name!r}")
+        if name not in SHARED:
+            raise ParameterError(
+                f"{path.name}: {EVERY_NODE}: {name!r} is not one of {', '.join(SHARED)}"
+            )
     return {
         node: {name: shared[name] for name in shared if name in {p.name for p in known}}
         | sections.get(f"{NAMESPACE}/{node}", {})

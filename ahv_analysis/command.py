@@ -15,6 +15,7 @@ from ahv_analysis.console import (
     Json,
     UsageError,
     console,
+    integer_option,
     number_option,
     one_sentence,
     progress_bar,
@@ -108,8 +109,8 @@ def fly(
             metavar="FILE|LEVEL",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the campaign of a draw.")] = 0,
-    run: Annotated[int, typer.Option(min=0, help="Number of the run of a draw.")] = 0,
+    seed: Annotated[int, integer_option("Seed of the campaign of a draw.")] = 0,
+    run: Annotated[int, integer_option("Number of the run of a draw.")] = 0,
     as_json: Json = False,
 ) -> None:
     """Fly a case; record it to OUT/bag (MCAP) and sum it up in OUT/summary.json."""
@@ -191,7 +192,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
 def figures(
     source: Annotated[Path, typer.Argument(help="Folder of a bag, or of a campaign.")],
     out: Annotated[Path, typer.Option(help="Folder for the figures.")],
-    runs: Annotated[int, typer.Option(min=1, help="Runs of a campaign to draw.")] = 100,
+    runs: Annotated[int, integer_option("Runs of a campaign to draw.", 1)] = 100,
     level: Annotated[
         float | None, typer.Option(help="Level of a campaign, if there are several.")
     ] = None,

@@ -41,6 +41,21 @@ def number_option(unit: str, meaning: str) -> Any:
     return typer.Option(help=f"{meaning} [{unit}].", parser=number, metavar="NUMBER")
 
 
+def integer_option(meaning: str, minimum: int = 0) -> Any:
+    """Return an option or argument that is an integer of at least `minimum`."""
+
+    def integer(text: str | int) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = minimum - 1
+        if value < minimum:
+            raise typer.BadParameter(f"{text!r} is not an integer from {minimum} on")
+        return value
+
+    return typer.Option(help=meaning, parser=integer, metavar="INTEGER")
+
+
 class UsageError(Exception):
     """Something asked for that cannot be had; one sentence, exit code 2."""
 

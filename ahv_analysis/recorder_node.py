@@ -5,11 +5,13 @@ from functools import partial
 from pathlib import Path
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
 
 from ahv_analysis.bag_writer import BagError, BagWriter
 from ahv_msgs_py.base_node import OK, QOS, VOLATILE_QOS, BaseNode, message_class, run
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
-from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS, LoopTopic
+from ahv_msgs_py.topics import DIAGNOSTICS, LOOP_TOPICS, NOMINAL_TOPICS, VIEWER_TOPICS, LoopTopic
 
 RECORDER_PARAMETERS = (
     Parameter("bag", "bag", "folder of the bag to write; it must not exist"),
@@ -18,7 +20,10 @@ RECORDER_PARAMETERS = (
 
 
 class RecorderNode(BaseNode):
-    """Listens to every topic; the bag is complete once the node is destroyed."""
+    """Listens to every topic; the bag is complete once the node is destroyed.
+
+    `finished` is set when the flight is over and all of its messages are in the bag.
+    """
 
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
@@ -29,6 +34,8 @@ class RecorderNode(BaseNode):
             self._bag = BagWriter(Path(str(self.settings["bag"])), str(self.settings["notes"]))
         except BagError as error:
             raise ParameterError(f"recorder: bag: {error}") from error
+        self._steps: int | None = None  # of the flight, once it is over
+        self._flown: Sequence[LoopTopic] = ()  # topics of the loop that flew
         topics = [(topic.name, topic.layout.type_name, QOS) for topic in LOOP_TOPICS]
         topics += [
             (topic.name, topic.type_name, QOS if topic.durable else VOLATILE_QOS)
@@ -39,9 +46,27 @@ class RecorderNode(BaseNode):
                 message_type = message_class(type_name)
             except ModuleNotFoundError:
                 continue  # /tf without tf2_msgs installed: then nobody here can send it either
-            write = partial(self._bag.write, name)
+            write = self._write_status if name == DIAGNOSTICS.name else partial(self._write, name)
             self.create_subscription(message_type, name, write, quality, raw=True)
         self.report(0, OK, f"recording to {self._bag.path}")
+
+    def _write(self, topic: str, data: bytes) -> None:
+        self._bag.write(topic, data)
+        if self._steps is not None and not self.missing(self._flown, self._steps):
+            self.finished.set_result("")
+
+    def _write_status(self, data: bytes) -> None:
+        """Learn from the plant that the flight is over, and after how many steps."""
+        for status in deserialize_message(data, DiagnosticArray).status:
+            facts = {fact.key: fact.value for fact in status.values}
+            if "over" in facts:
+                self._steps = int(facts["steps"])
+                self._flown = [
+                    topic
+                    for topic in LOOP_TOPICS
+                    if topic in NOMINAL_TOPICS or self.count_publishers(topic.name)
+                ]
+        self._write(DIAGNOSTICS.name, data)
 
     def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:
         """How many messages of these topics are still to come from a flight of so many steps."""

@@ -91,8 +91,8 @@ def percent(interval: Sequence[float]) -> str:
 def markdown(rows: Sequence[Row]) -> str:
     """Return the table as Markdown."""
     lines = [
-        "| controller | level | trials | report % | report's 95 % | here % | here 95 % | against the report"
-        " | trim within 5 deg % |",
+        "| controller | level | trials | report % | report's 95 % | here % | here 95 % "
+        "| against the report | trim within 5 deg % |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:

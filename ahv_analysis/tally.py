@@ -26,7 +26,7 @@ class Cause(IntEnum):
 
 
 class Tally(NamedTuple):
-    """Of one run, up to its failure; angles in rad, in the order of the rows of a block's result."""
+    """Of one run, up to its failure; angles in rad, in the order of a block's rows."""
 
     cause: float  # a Cause
     steps: float  # flown before the failure
@@ -58,7 +58,7 @@ def observer_error(state: State, learner: LearnerState) -> float:
 def count_step(
     tally: Tally, state: State, answer: Commands, observed: float, altitude: float, geometric: bool
 ) -> Tally:
-    """Tally after one more state and its answer; once a run has failed nothing changes any more."""
+    """Tally after one more state and its answer; once a run has failed nothing changes."""
     alpha = abs(atan_ratio(state.w, state.u))
     v = abs(state.v)
     beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more

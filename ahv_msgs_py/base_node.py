@@ -21,7 +21,13 @@ from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
-from ahv_msgs_py.parameters import Parameter, ParameterError, Value, check_parameters
+from ahv_msgs_py.parameters import (
+    SHARED,
+    Parameter,
+    ParameterError,
+    Value,
+    check_parameters,
+)
 from ahv_msgs_py.stepwise import Stepwise, Values
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE, QUEUE_DEPTH, LoopTopic
 
@@ -78,11 +84,12 @@ class BaseNode(Node):
 
     def _declare(self, name: str, parameters: Sequence[Parameter]) -> dict[str, Value]:
         """Check the given parameters, then declare them all with description, unit and range."""
+        own = {parameter.name for parameter in parameters}
+        ignored = {"use_sim_time", "start_type_description_service", *SHARED} - own
         given = {
             key: parameter.value
             for key, parameter in self.get_parameters_by_prefix("").items()
-            if key not in ("use_sim_time", "start_type_description_service")
-            and not key.startswith("qos_overrides.")
+            if key not in ignored and not key.startswith("qos_overrides.")
         }
         values = check_parameters(name, parameters, given)
         for parameter in parameters:
@@ -166,7 +173,11 @@ class BaseNode(Node):
 def run(node_class: Callable[..., BaseNode]) -> None:
     """Entry point of a node: run it until its `finished` is set or a signal comes."""
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    rclpy.init()
+    try:
+        rclpy.init()
+    except RuntimeError as error:  # arguments that ROS itself refuses
+        print(" ".join(str(error).split()), file=sys.stderr)
+        sys.exit(2)
     code = 0
     node = None
     executor = EventsExecutor()
@@ -174,6 +185,7 @@ def run(node_class: Callable[..., BaseNode]) -> None:
         node = node_class()
         executor.add_node(node)
         executor.spin_until_future_complete(node.finished, FOREVER)
+        code = 1 if node.finished.result() else 0
     except ParameterError as error:
         print(error, file=sys.stderr)
         code = 2

@@ -4,6 +4,12 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import NamedTuple
 
+# What a case file may set for all nodes by `/**`; a node that has no use for one ignores it.
+SHARED = (
+    "geometric_altitude",
+    "lambda",
+    *(f"{gain}_{rate}" for gain in ("k", "k_s", "k_ap") for rate in "PQR"),
+)
 Value = bool | int | float | str
 
 

@@ -2,9 +2,9 @@
 
 Frames: `base_link_frd` are body axes forward-right-down, `map_ned` is the flat Earth
 north-east-down (REP-103 suffixes). Quality of service, the same for all: reliable, transient
-local, keep last 100. Every answer carries the stamp of the state that it answers; transient local
-gives a node that joins late the state that it has to answer, so that no order of starting can lose
-a step.
+local, keep a whole flight. Every answer carries the stamp of the state that it answers; transient
+local gives a node that joins late what it missed: no order of starting loses a step, and a
+recorder that is late or slow gets everything.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from ahv_msgs_py.layout import Layout, NamedVector, StampedAcceleration, Stamped
 NAMESPACE = "/ahv"
 BODY_FRAME = "base_link_frd"
 EARTH_FRAME = "map_ned"
-QUEUE_DEPTH = 100  # messages kept per topic, sender and receiver
+QUEUE_DEPTH = 400_000  # messages kept per topic, sender and receiver: the longest flight
 
 STATE_NAMES = ("u", "v", "w", "P", "Q", "R", "phi", "theta", "psi", "x", "y", "h", "mass")
 BASIS_NAMES = ("one", "P", "P2", "Q", "Q2", "P2Q2", "R", "R2", "P2R2", "Q2R2", "P2Q2R2")

@@ -2,8 +2,8 @@
 
 `elementwise` functions accept lanes wherever they accept numbers, alone and within named tuples,
 and then advance all runs at once: one vector instruction of the processor for each operation.
-Every lane gets the bits of the scalar function. Comparisons give lanes of booleans, which `select`,
-`&` and `|` understand; conditional expressions, `and` and `or` do not.
+Every lane gets the bits of the scalar function. Comparisons give lanes of booleans, which
+`select`, `&` and `|` understand; conditional expressions, `and` and `or` do not.
 
 Lanes exist in compiled code only; `load` and `store` move them from and to arrays with one row
 for each number and one column for each run.

@@ -1,4 +1,4 @@
-"""Does a vehicle have a trim at all? Level flight found by the few numbers that it takes, in lanes."""
+"""Does a vehicle have a trim at all? Level flight by two equations, in lanes too."""
 
 from typing import NamedTuple
 

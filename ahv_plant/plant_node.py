@@ -1,16 +1,18 @@
 """Node `plant`: the vehicle in lockstep with its flight control."""
 
+from functools import partial
 from typing import Any
 
 import rclpy
 from geometry_msgs.msg import Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
 from scipy.spatial.transform import Rotation
 
 from ahv_msgs_py.base_node import ERROR, OK, QOS, BaseNode, message_class, run
 from ahv_msgs_py.layout import NANOSECONDS, clock_bytes
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Values
+from ahv_msgs_py.stepwise import Stepwise, Values
 from ahv_msgs_py.topics import (
     BODY_FRAME,
     CLOCK,
@@ -27,6 +29,7 @@ from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
 from ahv_plant.state import State, Surfaces
 from ahv_plant.vehicle import vehicle_step
 
+LONGEST_WAIT = Duration(seconds=5.0)  # for a listener that has stopped, per topic
 VIEWER_PERIOD = 10  # steps between messages for viewers: 10 Hz
 
 
@@ -45,7 +48,10 @@ class PlantNode(BaseNode):
         self.step = 0
         self.state = self.flight.initial
         self._started = False
-        self.receive_together((SURFACE_COMMAND, THROTTLE_COMMAND), self._advance)
+        topics = (SURFACE_COMMAND, THROTTLE_COMMAND)
+        self._inputs = Stepwise([topic.name for topic in topics], self._advance)
+        for topic in topics:
+            self.receive(topic, partial(self._take, topic.name))
         self._clock = self.create_publisher(message_class(CLOCK.type_name), CLOCK.name, QOS)
         self._odometry = self.create_publisher(Odometry, ODOMETRY.name, QOS)
         self._transform = self._transform_publisher()
@@ -72,6 +78,17 @@ class PlantNode(BaseNode):
             self._publish_for_viewers(stamp)
         self._send_state(stamp, self.state)
 
+    def _take(self, name: str, stamp: int, values: Values) -> None:
+        """Take a command, unless it answers a state that was never sent: one of another flight."""
+        if self.finished.done():
+            return
+        if self._started and stamp <= self.step * STEP_NS:
+            self._inputs.put(name, stamp, values)
+        else:
+            self._finish(
+                0, ERROR, f"{name} has commands of another flight: restart the controllers"
+            )
+
     def _advance(self, stamp: int, surfaces: Values, throttle: Values) -> None:
         """Integrate one step, or end the flight."""
         if stamp != self.step * STEP_NS or self.finished.done():
@@ -92,11 +109,17 @@ class PlantNode(BaseNode):
         self._publish()
 
     def _finish(self, stamp: int, level: bytes, reason: str) -> None:
-        self.report(stamp, level, reason or "flown to the end", steps=self.step)
+        self.report(stamp, level, reason or "flown to the end", steps=self.step, over=True)
         self.get_logger().info(
             f"flight over after {self.step} steps: {reason or 'flown to its end'}"
         )
         self.finished.set_result(reason)
+
+    def destroy_node(self) -> None:
+        """Wait until every listener has got everything, then end."""
+        for publisher in self.publishers:
+            publisher.wait_for_all_acked(LONGEST_WAIT)
+        super().destroy_node()
 
     def _publish_for_viewers(self, stamp: int) -> None:
         """Send pose and velocity as tools know them: a quaternion is good enough to look at."""

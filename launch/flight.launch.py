@@ -10,11 +10,10 @@ from pathlib import Path
 
 import yaml
 from ament_index_python.packages import get_package_share_directory
+from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown, TimerAction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
-
-from launch import LaunchContext, LaunchDescription
 
 CONTROLLERS = ("outer_intermediate", "inner_loop", "velocity")
 LEARNER = "disturbance_learner"  # flies with the cases whose inner loop is adaptive

@@ -1,0 +1,269 @@
+"""A campaign is its runs: whatever flies them, wherever it stopped, each can be flown again."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy.stats import beta
+
+from ahv_analysis.campaign import (
+    Campaign,
+    CampaignError,
+    campaign_file,
+    exact_interval,
+    fly_campaign,
+    open_campaign,
+    read_runs,
+    summarize_campaign,
+)
+from ahv_analysis.case import load_case
+from ahv_analysis.table import CONTROLLERS, REPORT, fly_table, markdown
+from test.test_command import ahv
+
+RUNS = 150
+
+
+def campaign(name="neuro_adaptive_di", level=0.4, runs=RUNS, seed=2, random_starts=False):
+    return Campaign(load_case(name, {"duration": 20.0}), level, runs, seed, random_starts)
+
+
+def same(one, other):
+    return one.keys() == other.keys() and all(np.array_equal(one[key], other[key]) for key in one)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """A campaign of short flights and its folder."""
+    folder = tmp_path_factory.mktemp("campaign")
+    with ThreadPoolExecutor(2) as pool:
+        return fly_campaign(campaign(), folder, pool), folder
+
+
+def test_a_row_a_run(flown):
+    table, folder = flown
+    assert table["run"].tolist() == list(range(RUNS))
+    file = pq.read_table(campaign_file(campaign(), folder))
+    assert file.num_rows == RUNS
+    assert {"CL", "Izz", "cause", "time_s", "max_abs_alpha_deg", "trim_exists"} <= set(
+        file.column_names
+    )
+    assert np.all(table["alpha_margin_deg"] == 5.0 - table["max_abs_alpha_deg"])
+    failed = table["cause"] != 0
+    assert 0 < failed.sum() < RUNS // 2
+    assert np.all(table["time_s"][~failed] == 20.0) and np.all(table["time_s"][failed] < 20.0)
+
+
+def test_order_of_execution_changes_nothing(flown, tmp_path):
+    class Backwards(ThreadPoolExecutor):
+        """An executor that runs the last job first, and only when all are there."""
+
+        def __init__(self):
+            super().__init__(1)
+            self.jobs = []
+
+        def submit(self, function, *arguments):
+            future: Future = Future()
+            self.jobs.append((future, function, arguments))
+            if len(self.jobs) == -(-RUNS // 64):
+                for waiting, work, given in reversed(self.jobs):
+                    waiting.set_result(work(*given))
+            return future
+
+    table, _ = flown
+    assert same(fly_campaign(campaign(), tmp_path, Backwards()), table)
+
+
+def test_an_interrupted_campaign_resumes(flown, tmp_path):
+    class Interrupted(ThreadPoolExecutor):
+        """An executor that is interrupted in its second job."""
+
+        def submit(self, function, campaign, first, count):
+            future: Future = Future()
+            if first >= 64:
+                future.set_exception(KeyboardInterrupt())
+            else:
+                future.set_result(function(campaign, first, count))
+            return future
+
+    with pytest.raises(KeyboardInterrupt):
+        fly_campaign(campaign(), tmp_path, Interrupted())
+    kept, _ = read_runs(campaign_file(campaign(), tmp_path))
+    begun = []
+    with ThreadPoolExecutor(2) as pool:
+        table = fly_campaign(campaign(), tmp_path, pool, begun.append)
+    assert begun[0] == len(kept["run"]) and begun[-1] == RUNS
+    assert same(table, flown[0])
+
+
+def test_more_runs_add_to_a_campaign_and_fewer_are_a_part_of_it(flown, tmp_path):
+    with ThreadPoolExecutor(2) as pool:
+        fly_campaign(campaign(runs=70), tmp_path, pool)
+        assert same(fly_campaign(campaign(), tmp_path, pool), flown[0])
+        part = fly_campaign(campaign(runs=10), tmp_path, pool)
+    assert part["run"].tolist() == list(range(10))
+    assert pq.read_table(campaign_file(campaign(), tmp_path)).num_rows == RUNS
+
+
+@pytest.mark.parametrize("change", [{"seed": 3}, {"name": "neuro_adaptive_sc_gdi"}])
+def test_another_campaign_is_not_mixed_in(flown, change):
+    _, folder = flown
+    with ThreadPoolExecutor(1) as pool, pytest.raises(CampaignError, match="another campaign"):
+        fly_campaign(campaign(**change), folder, pool)
+
+
+def test_a_folder_gives_its_campaign_back(flown):
+    table, folder = flown
+    found = open_campaign(folder)
+    assert found == campaign()
+    assert same(read_runs(campaign_file(found, folder))[0], table)
+    with pytest.raises(CampaignError, match=r"choose from by --level; there are: 0\.4"):
+        open_campaign(folder, 0.3)
+    with pytest.raises(CampaignError, match="none"):
+        open_campaign(folder / "nowhere")
+
+
+def test_random_starts_spread_as_section_3_5_2_says():
+    spread = campaign("nominal_di", level=0.0, random_starts=True)
+    centre = spread.case.plant.initial
+    starts = np.array([spread.start(run) for run in range(400)]) - np.array(centre)
+    names = dict(zip(centre._fields, starts.T, strict=True))
+    assert 95 < np.max(np.abs(names["u"])) <= 100.0
+    assert 480 < np.max(np.abs(names["h"])) <= 500.0
+    for rate in "PQR":
+        assert 4.8 < np.degrees(np.max(np.abs(names[rate]))) <= 5.0 + 1e-9
+    for still in ("v", "w", "phi", "theta", "psi", "x", "y", "mass"):
+        assert not np.any(names[still])
+
+
+@pytest.mark.parametrize("successes, runs", [(0, 50), (50, 50), (3580, 3602)])
+def test_intervals_are_exact(successes, runs):
+    low, high = exact_interval(successes, runs)
+    assert low == pytest.approx(
+        beta.ppf(0.025, successes, runs - successes + 1) if successes else 0.0
+    )
+    assert high == pytest.approx(
+        beta.ppf(0.975, successes + 1, runs - successes) if successes < runs else 1.0
+    )
+
+
+def test_the_summary_counts(flown):
+    table, _ = flown
+    summary = summarize_campaign(campaign(), table)
+    assert summary["runs"] == RUNS == summary["successes"] + sum(summary["failures"].values())
+    assert summary["success_rate"] == summary["successes"] / RUNS
+    low, high = summary["interval"]
+    assert low < summary["success_rate"] < high
+
+
+def test_the_table_has_the_report_s_counts(tmp_path):
+    assert sum(row.trials for row in REPORT) == 14832
+    with ThreadPoolExecutor(2) as pool:
+        done = []
+        rows = fly_table(tmp_path, pool, 1, 16, True, done.append)
+    assert [row.flown["controller"] for row in rows] == [
+        f"{name}_protected" for name in CONTROLLERS for _ in REPORT
+    ]
+    assert done[-1] == 8 * 16
+    text = markdown(rows)
+    assert text.count("\n") == 2 + 8
+    assert "| 99.39 | [99.08, 99.6" in text and "| 89.21 | [88.19, 90.1" in text
+
+
+def test_dask_flies_the_same_campaign_and_outlives_a_worker(flown, tmp_path):
+    from distributed import Client, LocalCluster
+
+    with (
+        LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
+        ) as cluster,
+        Client(cluster) as client,
+        client.get_executor(pure=False, retries=10) as pool,
+    ):
+        victim = next(iter(cluster.workers.values()))
+        killed = []
+
+        def kill(done):
+            if not killed:
+                killed.append(victim.pid)
+                victim.process.process._process.kill()
+
+        table = fly_campaign(campaign(), tmp_path, pool, kill)
+    assert killed
+    assert same(table, flown[0])
+
+
+def test_the_command_flies_reruns_and_draws(tmp_path):
+    out = tmp_path / "campaign"
+    command = ("monte-carlo", "--controller", "neuro_adaptive_di", "--level", 0.4, "--runs", 20)
+    result = ahv(*command, "--seed", 2, "--out", out, "--json")
+    assert result.returncode == 0, result.stderr
+    summary = json.loads(result.stdout)
+    keys = "controller level runs successes success_rate interval failures"
+    assert set(keys.split()) | {"trial_steps_per_second", "wall_s"} <= set(summary)
+    assert (summary["controller"], summary["level"]) == ("neuro_adaptive_di", 0.4)
+    again = ahv("monte-carlo", "rerun", out, 6, "--json")
+    assert json.loads(again.stdout)["same_bits"] is True, again.stdout
+    figures = ahv("figures", out, "--runs", 6, "--out", tmp_path / "figures", "--json")
+    assert figures.returncode == 0, figures.stderr
+    names = {Path(name).name for name in json.loads(figures.stdout)["figures"]}
+    assert names == {f"figure_4_{n}.{kind}" for n in range(6, 11) for kind in ("png", "svg")}
+
+
+def test_a_run_can_be_flown_on_the_graph(tmp_path):
+    out = tmp_path / "campaign"
+    fly = ("monte-carlo", "--controller", "nominal_di", "--random-starts", "--level", 0.0)
+    assert ahv(*fly, "--runs", 3, "--out", out, "--json").returncode == 0
+    result = ahv("monte-carlo", "rerun", out, 2, "--graph", "--out", tmp_path / "run", "--json")
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["same_bits"] is True and found["ended_early"] == ""
+    from ahv_analysis.bag_reader import read_bag
+
+    flight = read_bag(Path(found["bag"]))
+    assert flight.steps == 15000
+    assert np.max(np.abs(np.degrees(flight.air.alpha))) == pytest.approx(
+        found["max_abs_alpha_deg"], rel=1e-12
+    )
+
+
+def test_ctrl_c_keeps_what_was_flown(tmp_path):
+    out = tmp_path / "campaign"
+    process = subprocess.Popen(
+        [Path(sys.executable).parent / "ahv", "monte-carlo", "--runs", "20000", "--out", str(out)],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    file = out / "runs-0.3.parquet"
+    deadline = time.monotonic() + 60
+    while not file.exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "resumes" in errors and "Traceback" not in errors
+    assert pq.read_table(file).num_rows >= 64
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (("monte-carlo", "--controller", "nope"), ("nope", "neuro_adaptive_di")),
+        (("monte-carlo", "--level", 2.0), ("level 2", "0 to 0.9")),
+        (("monte-carlo", "--runs", 0), ("--runs",)),
+        (("monte-carlo", "rerun", "nowhere", 1), ("nowhere", "none")),
+        (("table", "--runs", "many"), ("--runs", "many")),
+        (("figures", ".", "--out", "x"), ("not a bag",)),
+    ],
+)
+def test_wrong_input_is_named(arguments, words, tmp_path):
+    result = ahv(*arguments, cwd=tmp_path)
+    assert result.returncode == 2, result.stderr
+    assert result.stdout == "" and "Traceback" not in result.stderr
+    assert all(word in result.stderr for word in words), result.stderr

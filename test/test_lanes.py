@@ -1,0 +1,230 @@
+"""A lane is a run: the same bits as alone, by machine instructions that advance all at once."""
+
+import math
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ahv_analysis.block import (
+    LIKE,
+    adaptive_block,
+    fly_alone,
+    fly_block,
+    fly_trajectory,
+)
+from ahv_analysis.campaign import Campaign
+from ahv_analysis.case import load_case
+from ahv_analysis.flight import fly
+from ahv_analysis.record import record
+from ahv_analysis.tally import Cause, Tally
+from ahv_control.flight_control import (
+    NEUTRAL,
+    adaptive_control,
+    first_learner,
+    next_learner,
+)
+from ahv_plant.compiled import kernel
+from ahv_plant.constants import STEP
+from ahv_plant.dispersion import Truth, draw_dispersion
+from ahv_plant.lanes import LANES, load, store, widen
+from ahv_plant.level_trim import LevelTrim, level_trim
+from ahv_plant.state import State
+from ahv_plant.trim import trim
+from ahv_plant.vehicle import vehicle_step
+
+STEPS = 15000
+SEED = 5
+
+
+@kernel
+def last_of_flight(state, truth, control, steps):
+    """State and learner at the end of an adaptive flight; the numbers may be lanes."""
+    one = state.u
+    learner = widen(first_learner(state), one)
+    answer = widen(adaptive_control(state, learner, NEUTRAL, control), one)
+    for step in range(steps):
+        later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
+        learner = next_learner(
+            learner, state, answer.surfaces, answer.rates, later, control.learner
+        )
+        answer = widen(adaptive_control(later, learner, answer.surfaces, control), one)
+        state = later
+    return state, learner
+
+
+@kernel
+def last_of_block(states, dispersions, like, control, steps, result):
+    """Ends of a block of flights, a row a number."""
+    truth = Truth(False, load(like[1], dispersions), None)
+    store(result, last_of_flight(load(like[0], states), truth, control, steps))
+
+
+def flat(value):
+    if isinstance(value, tuple):
+        return [number for part in value for number in flat(part)]
+    return [value]
+
+
+def as_lanes(rows):
+    return np.ascontiguousarray(np.array(rows).T)
+
+
+def same_bits(one, other):
+    return np.asarray(one, float).tobytes() == np.asarray(other, float).tobytes()
+
+
+@pytest.fixture(scope="module")
+def case():
+    return load_case("neuro_adaptive_sc_gdi_protected")
+
+
+@pytest.fixture(scope="module")
+def ends(case):
+    """Last states and learners (13 + 39, LANES) of a block of 15 000 steps at 40 %."""
+    result = np.empty((13 + 39, LANES))
+    last_of_block(
+        as_lanes([case.plant.initial] * LANES),
+        as_lanes([draw_dispersion(0.4, SEED, run) for run in range(LANES)]),
+        LIKE,
+        case.control,
+        STEPS,
+        result,
+    )
+    return result
+
+
+def test_a_lane_has_the_bits_of_the_scalar_run(case, ends):
+    for run in range(LANES):
+        truth = Truth(dispersion=draw_dispersion(0.4, SEED, run))
+        alone = last_of_flight(case.plant.initial, truth, case.control, STEPS)
+        assert same_bits(ends[:, run], flat(alone)), run
+
+
+PLAIN = """
+from ahv_analysis.case import dispersion_parameters, load_case
+from ahv_analysis.flight import fly
+from ahv_plant.dispersion import draw_dispersion
+
+plant = dispersion_parameters(draw_dispersion(0.4, {seed}, {run}))
+for step in fly(load_case("neuro_adaptive_sc_gdi_protected", plant)):
+    pass
+learner = [number for part in step.learner for number in part]
+print(*(number.hex() for number in [*step.state, *learner]))
+"""
+
+
+def test_a_lane_has_the_bits_of_plain_python_floats(ends):
+    run = 3
+    result = subprocess.run(
+        [sys.executable, "-c", PLAIN.format(seed=SEED, run=run)],
+        env={"NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    numbers = [float.fromhex(number) for number in result.stdout.split()]
+    assert same_bits(ends[:, run], numbers)
+
+
+def test_the_machine_code_is_packed(case):
+    adaptive_block(
+        as_lanes([case.plant.initial] * LANES),
+        as_lanes([draw_dispersion(0.1, 0, run) for run in range(LANES)]),
+        LIKE,
+        case.control,
+        False,
+        1,
+        np.empty((len(Tally._fields), LANES)),
+    )
+    code = "".join(adaptive_block.inspect_asm().values())
+    if not code:
+        pytest.skip("loaded from the cache, which keeps no assembly")
+    packed = len(re.findall(r"\tv?(?:mul|add|sub)pd\b", code))
+    single = len(re.findall(r"\tv?(?:mul|add|sub)sd\b", code))
+    fused = len(re.findall(r"\tvf(?:n?madd|n?msub)", code))
+    assert packed > 1000 and single < 0.05 * packed
+    assert fused == 0  # a fused multiply-add would round differently
+
+
+@pytest.mark.parametrize("name", ["nominal_di_dispersed", "neuro_adaptive_di"])
+def test_a_tally_is_the_same_alone_and_in_a_lane_and_true_of_the_flight(name):
+    campaign = Campaign(load_case(name, {"duration": 30.0}), 0.4, 20, SEED)
+    runs = range(campaign.runs)
+    tallies = fly_block(
+        np.array([campaign.start(run) for run in runs]),
+        np.array([campaign.dispersion(run) for run in runs]),
+        campaign.case.control,
+        False,
+        3000,
+    )
+    for run in runs:
+        one = campaign.case_of(run)
+        alone = fly_alone(one.plant.initial, one.plant.truth, one.control, one.plant.steps)
+        assert same_bits(alone, tallies[run]), run
+    one = campaign.case_of(7)
+    flown, tally = record(fly(one), False), Tally(*tallies[7])
+    until = slice(int(tally.steps))
+    assert tally.max_abs_alpha == pytest.approx(
+        np.max(np.abs(flown.air.alpha[: int(tally.steps) + 1])), rel=1e-12
+    )
+    assert tally.min_surface == np.min(flown.surfaces[until])
+    assert tally.max_throttle == np.max(flown.throttle[until])
+    assert tally.final_altitude == flown.column("h")[until][-1]
+
+
+@pytest.mark.parametrize(
+    "change, cause",
+    [
+        ({"u": math.nan}, Cause.STATE_IS_NOT_FINITE),
+        ({"h": math.inf}, Cause.STATE_IS_NOT_FINITE),
+        ({"h": -10.0}, Cause.LEFT_THE_ATMOSPHERE_MODEL),
+        ({"h": 60000.0}, Cause.LEFT_THE_ATMOSPHERE_MODEL),
+        ({"u": 1.0, "w": 0.0}, Cause.SURFACES_LOST_THE_VEHICLE),
+        ({"w": 200.0}, Cause.INLET_UNSTART),
+    ],
+)
+def test_a_broken_lane_fails_with_its_cause_and_touches_no_other(change, cause):
+    case = load_case("neuro_adaptive_di")
+    starts = [case.plant.initial] * LANES
+    vehicles = np.array([draw_dispersion(0.2, SEED, run) for run in range(LANES)])
+    whole = fly_block(np.array(starts), vehicles, case.control, False, 500)
+    starts[5] = case.plant.initial._replace(**change)
+    broken = fly_block(np.array(starts), vehicles, case.control, False, 500)
+    assert Tally(*broken[5]).cause == cause
+    assert Tally(*broken[5]).steps == 0
+    others = np.arange(LANES) != 5
+    assert same_bits(broken[others], whole[others])
+    assert not np.any(whole[:, 0])
+
+
+def test_a_trajectory_to_draw_is_that_of_the_flight():
+    case = load_case("neuro_adaptive_di", {"duration": 5.0})
+    kept, flown = fly_trajectory(case, 10), record(fly(case), False)
+    assert np.array_equal(kept.stamps, flown.stamps[::10])
+    for name in ("states", "attitude_commands", "rate_commands", "surfaces", "throttle"):
+        assert same_bits(getattr(kept, name), getattr(flown, name)[::10]), name
+
+
+@pytest.mark.parametrize("run", range(6))
+def test_level_trim_is_the_trim_of_all_seven_equations(run):
+    truth = Truth(dispersion=draw_dispersion(0.4, SEED, run))
+    found = LevelTrim(*level_trim(24000.0, 1786.4, 136077.6, truth))
+    full = trim(truth=truth)
+    assert (found.exists == 1.0) == (full.converged and full.within_limits)
+    if full.converged:
+        assert found.alpha == pytest.approx(full.alpha, abs=1e-8)
+        assert found.elevon == pytest.approx(full.surfaces.right_elevon, abs=1e-7)
+        assert found.throttle == pytest.approx(full.throttle, abs=1e-7)
+
+
+def test_a_block_needs_no_multiple_of_the_lanes():
+    case = load_case("neuro_adaptive_di")
+    vehicles = np.array([draw_dispersion(0.2, SEED, run) for run in range(LANES + 3)])
+    starts = np.array([case.plant.initial] * len(vehicles))
+    tallies = fly_block(starts, vehicles, case.control, False, 100)
+    assert tallies.shape == (LANES + 3, len(Tally._fields))
+    assert same_bits(tallies[-1:], fly_block(starts[-1:], vehicles[-1:], case.control, False, 100))
+    assert State(*starts[0]) == case.plant.initial
