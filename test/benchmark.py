@@ -1,59 +1,202 @@
-"""Rates of the engines, as ratios to work measured in the same run: `make bench`."""
+"""Rates of the engines, each beside a reference measured in the same run: `make bench`."""
 
+import json
 import os
+import subprocess
+import sys
 import tempfile
 import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from ahv_analysis.block import fly_alone, fly_block
+from ahv_analysis.campaign import Campaign, fly_campaign
 from ahv_analysis.case import load_case
 from ahv_analysis.flight import fly
 from ahv_analysis.graph_flight import fly_graph
+from ahv_analysis.table import REPORT
+from ahv_plant.compiled import kernel
 from ahv_plant.constants import STEP
+from ahv_plant.lanes import FLOATS, LANES, load, store
 
 ROUNDS = 3
+TRIALS = 2048
+
+# Counts the additions, multiplications and divisions of one step of one run, in plain Python.
+COUNT = """
+import json
+from ahv_analysis.case import load_case
+from ahv_control.flight_control import NEUTRAL, adaptive_control, first_learner, next_learner
+from ahv_plant.vehicle import vehicle_step
+
+counts = {"add": 0, "multiply": 0, "divide": 0}
 
 
-def spin_reference() -> float:
-    """Seconds of a fixed piece of plain Python, to tell a slow machine from a slow graph."""
+class Number(float):
+    pass
+
+
+def counting(operation, kind):
+    def counted(*numbers):
+        counts[kind] += 1
+        return Number(operation(*numbers))
+
+    return counted
+
+
+for name, kind in (("add", "add"), ("sub", "add"), ("mul", "multiply"), ("truediv", "divide")):
+    for prefix in ("__", "__r"):
+        method = f"{prefix}{name}__"
+        setattr(Number, method, counting(getattr(float, method), kind))
+Number.__neg__ = lambda number: Number(float.__neg__(number))
+Number.__abs__ = lambda number: Number(float.__abs__(number))
+
+
+def number(value):
+    if isinstance(value, float):
+        return Number(value)
+    return type(value)(*map(number, value)) if isinstance(value, tuple) else value
+
+
+case = load_case("neuro_adaptive_sc_gdi")
+state, truth, control = number(case.plant.initial), number(case.plant.truth), number(case.control)
+learner = first_learner(state)
+answer = adaptive_control(state, learner, number(NEUTRAL), control)
+counts.update(dict.fromkeys(counts, 0))
+later = vehicle_step(state, answer.surfaces, answer.throttle, 0.0, truth)
+learner = next_learner(learner, state, answer.surfaces, answer.rates, later, control.learner)
+adaptive_control(later, learner, answer.surfaces, control)
+print(json.dumps(counts))
+"""
+
+
+@intrinsic
+def fused(typingctx, a, b, c):
+    """Fused multiply-add of lanes, which nothing but this measurement uses."""
+
+    def emit(context, builder, signature, arguments):
+        vector = arguments[0].type
+        kind = ir.FunctionType(vector, [vector] * 3)
+        name = f"llvm.fma.v{LANES}f64"
+        function = cgutils.get_or_insert_function(builder.module, kind, name)
+        return builder.call(function, arguments)
+
+    return FLOATS(FLOATS, FLOATS, FLOATS), emit
+
+
+@kernel
+def multiply_add(numbers, count, result):
+    """Twelve independent chains of fused multiply-adds, enough to hide their latency."""
+    a, b, c, d, e, f = load((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), numbers)
+    x, y = a, b
+    for _ in range(count):
+        a, b, c = fused(a, x, y), fused(b, x, y), fused(c, x, y)
+        d, e, f = fused(d, x, y), fused(e, x, y), fused(f, x, y)
+    store(result, a + b + c + d + e + f)
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Seconds that `work` takes."""
     started = time.perf_counter()
-    total = 0
-    for number in range(3_000_000):
-        total += number & 7
+    work()
     return time.perf_counter() - started
 
 
+def median(values: list[float]) -> float:
+    """Middle value."""
+    return sorted(values)[len(values) // 2]
+
+
+def plain_python() -> None:
+    """Do a fixed piece of plain Python, to tell a slow machine from a slow graph."""
+    total = 0
+    for number in range(3_000_000):
+        total += number & 7
+
+
+def bench_graph() -> None:
+    """One flight at a time: library, graph, recorder."""
+    for name in ("nominal_di", "neuro_adaptive_sc_gdi"):
+        case = load_case(name)
+        steps = case.plant.steps
+        for _ in zip(range(2), fly(case), strict=False):
+            pass
+        walls: dict[str, list[float]] = {}
+        with tempfile.TemporaryDirectory() as folder:
+            for number in range(ROUNDS):
+                for engine, wall in (
+                    ("library", timed(lambda: list(fly(case)))),  # noqa: B023
+                    ("graph, no recorder", fly_graph(case, None)[1]),
+                    ("graph, recorder on", fly_graph(case, Path(folder) / str(number))[1]),
+                    ("plain Python reference", timed(plain_python)),
+                ):
+                    walls.setdefault(engine, []).append(wall)
+        reference = median(walls["plain Python reference"])
+        print(f"\n{name}: {steps} steps of {STEP} s, median of {ROUNDS}, one process")
+        print(f"{'':24}{'wall s':>8}{'steps/s':>10}{'x real time':>13}{'x reference':>13}")
+        for engine, measured in walls.items():
+            wall = median(measured)
+            pace = f"{steps / wall:10.0f}{steps * STEP / wall:13.1f}"
+            blank = engine == "plain Python reference"
+            print(f"{engine:24}{wall:8.2f}{'' if blank else pace:>23}{wall / reference:13.2f}")
+
+
+def bench_lanes() -> None:
+    """Many flights at once: run-steps per second and core, against the machine's peak."""
+    campaign = Campaign(load_case("neuro_adaptive_sc_gdi"), 0.1, TRIALS, 1)
+    case, steps = campaign.case, campaign.case.plant.steps
+    counts = json.loads(
+        subprocess.run(
+            [sys.executable, "-c", COUNT],
+            env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+    )
+    operations = counts["add"] + counts["multiply"]
+    starts = np.array([case.plant.initial] * LANES)
+    vehicles = np.array([campaign.dispersion(run) for run in range(LANES)])
+    numbers = np.full((6, LANES), 0.5)
+    result = np.empty((1, LANES))
+    chains = 20_000_000
+    truth = case.plant.truth
+    fly_block(starts, vehicles, case.control, False, 2)
+    fly_alone(case.plant.initial, truth, case.control, 2)
+    multiply_add(numbers, 10, result)
+    lanes, alone, peaks = [], [], []
+    for _ in range(ROUNDS):
+        wall = timed(lambda: fly_block(starts, vehicles, case.control, False, steps))
+        lanes.append(wall / steps / LANES)
+        wall = timed(lambda: fly_alone(case.plant.initial, truth, case.control, steps))
+        alone.append(wall / steps)
+        peaks.append(6 * LANES * chains / timed(lambda: multiply_add(numbers, chains, result)))
+    peak, lane = median(peaks), median(lanes)
+    print(f"\nOne core, adaptive SC-GDI: {operations} additions and multiplications,")
+    print(f"{counts['divide']} divisions a run-step; medians of {ROUNDS}")
+    print(f"{'scalar':24}{median(alone) * 1e6:8.3f} us a run-step")
+    print(f"{'lanes':24}{lane * 1e6:8.3f} us a run-step, {median(alone) / lane:.1f} x scalar")
+    print(f"{'multiply-add peak':24}{peak / 1e9:8.1f} G/s, measured")
+    print(f"{'of peak':24}{operations / lane / peak:8.0%} in additions and multiplications")
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
+        wall = timed(lambda: fly_campaign(campaign, Path(folder), pool))
+    total = 2 * sum(row.trials for row in REPORT)
+    pace = TRIALS * steps / wall
+    print(f"\nAll cores: {TRIALS} trials in {wall:.1f} s, {pace:.3g} run-steps/s;")
+    print(f"Table 5.1, {total} trials, projected: {total * steps / pace:.0f} s")
+
+
 def main() -> None:
-    """Fly the nominal case by every engine, in turn, and print the medians."""
+    """Measure everything."""
     os.environ.setdefault("ROS_DOMAIN_ID", "99")
-    case = load_case("nominal_di")
-    steps = case.plant.steps
-    for _ in zip(range(2), fly(case), strict=False):
-        pass
-    walls: dict[str, list[float]] = {
-        "library": [],
-        "graph, no recorder": [],
-        "graph, recorder on": [],
-        "plain Python reference": [],
-    }
-    with tempfile.TemporaryDirectory() as folder:
-        for number in range(ROUNDS):
-            started = time.perf_counter()
-            for _ in fly(case):
-                pass
-            walls["library"].append(time.perf_counter() - started)
-            walls["graph, no recorder"].append(fly_graph(case, None)[1])
-            walls["graph, recorder on"].append(fly_graph(case, Path(folder) / str(number))[1])
-            walls["plain Python reference"].append(spin_reference())
-    reference = sorted(walls["plain Python reference"])[ROUNDS // 2]
-    print(f"{steps} steps of {STEP} s, median of {ROUNDS}, all nodes in one process")
-    print(f"{'':24}{'wall s':>8}{'steps/s':>10}{'x real time':>13}{'x reference':>13}")
-    for name, measured in walls.items():
-        wall = sorted(measured)[ROUNDS // 2]
-        if name == "plain Python reference":
-            print(f"{name:24}{wall:8.2f}{'':>10}{'':>13}{1:13.2f}")
-        else:
-            pace = steps * STEP / wall
-            print(f"{name:24}{wall:8.2f}{steps / wall:10.0f}{pace:13.1f}{wall / reference:13.2f}")
+    bench_graph()
+    bench_lanes()
 
 
 if __name__ == "__main__":
