@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 import yaml
-from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 
-from ahv_analysis.bag_writer import NOTES, BagError
+from ahv_analysis.bag_writer import NOTES
+from ahv_analysis.errors import BagError
 from ahv_analysis.record import FlightRecord
-from ahv_msgs_py.base_node import message_class
 from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
@@ -66,10 +65,13 @@ def read_bag(path: Path) -> FlightRecord:
 
 def read_notes(path: Path) -> dict[str, Any] | None:
     """What `ahv fly` filed with a bag: the case and its parameters; None in other bags."""
-    metadata = yaml.safe_load((path / "metadata.yaml").read_text())
-    notes = (metadata["rosbag2_bagfile_information"].get("custom_data") or {}).get(NOTES)
-    found: dict[str, Any] | None = json.loads(notes) if notes else None
-    return found
+    try:
+        metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+        notes = json.loads(metadata["rosbag2_bagfile_information"]["custom_data"][NOTES])
+    except (yaml.YAMLError, ValueError, KeyError, TypeError):
+        return None  # a recorder of somebody else's, or none of our notes
+    ours = isinstance(notes, dict) and {"case", "parameters"} <= notes.keys()
+    return notes if ours else None
 
 
 def _series(reader: Reader, topic: LoopTopic) -> dict[int, tuple[float, ...]]:
@@ -88,8 +90,13 @@ def _series(reader: Reader, topic: LoopTopic) -> dict[int, tuple[float, ...]]:
 def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:
     """Read a message of another sender, whose layout is not the usual one.
 
-    By rclpy and not by rosbags, which refuses the surplus bytes that rclpy leaves behind the end.
+    By rclpy and not by rosbags, which refuses the surplus bytes that rclpy leaves behind the end;
+    only such a bag needs ROS to be read.
     """
+    from rclpy.serialization import deserialize_message
+
+    from ahv_msgs_py.base_node import message_class
+
     return topic.layout.values_of(deserialize_message(data, message_class(topic.layout.type_name)))
 
 

@@ -16,6 +16,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
 from rosbags.typesys import Stores, get_typestore
 
+from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
 
@@ -33,10 +34,6 @@ _QOS = Qos(
 )
 _STAMP = Struct("<iI")
 NOTES = "ahv"  # key of the notes in the bag's custom data
-
-
-class BagError(Exception):
-    """A bag that cannot be written or read; the message is one sentence."""
 
 
 class BagWriter:

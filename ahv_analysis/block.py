@@ -63,16 +63,16 @@ def fly_nominal(state, truth, control, steps):
 
 
 @kernel
-def adaptive_block(states, dispersions, like, control, geometric, steps, result):
+def adaptive_block(states, dispersions, like, truth, control, steps, result):
     """Fly a block of adaptive runs: states (13, LANES) and dispersions (9, LANES) to result."""
-    truth = Truth(geometric, load(like[1], dispersions), None)
+    truth = Truth(truth.geometric, load(like[1], dispersions), truth.disturbance)
     store(result, fly_adaptive(load(like[0], states), truth, control, steps))
 
 
 @kernel
-def nominal_block(states, dispersions, like, control, geometric, steps, result):
+def nominal_block(states, dispersions, like, truth, control, steps, result):
     """Fly a block of nominal runs: states (13, LANES) and dispersions (9, LANES) to result."""
-    truth = Truth(geometric, load(like[1], dispersions), None)
+    truth = Truth(truth.geometric, load(like[1], dispersions), truth.disturbance)
     store(result, fly_nominal(load(like[0], states), truth, control, steps))
 
 
@@ -147,9 +147,12 @@ def fly_trajectory(case: Case, every: int) -> FlightRecord:
 
 
 def fly_block(
-    states: Array, dispersions: Array, control: FlightControl, geometric: bool, steps: int
+    states: Array, dispersions: Array, truth: Truth, control: FlightControl, steps: int
 ) -> Array:
-    """Tallies (N, 14) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9)."""
+    """Tallies (N, 14) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9).
+
+    Disturbance and kind of altitude are those of `truth`.
+    """
     fly = nominal_block if control.learner is None else adaptive_block
     tallies = np.empty((len(Tally._fields), LANES))
     rows = []
@@ -158,8 +161,8 @@ def fly_block(
             _lanes(states, first),
             _lanes(dispersions, first),
             LIKE,
+            truth,
             control,
-            geometric,
             steps,
             tallies,
         )

@@ -1,10 +1,12 @@
 """Monte-Carlo campaigns: drawn flights on any executor, one row a run, resumed if stopped."""
 
 import json
+import os
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +17,18 @@ from scipy.stats import binomtest
 
 from ahv_analysis.block import find_trims, fly_block
 from ahv_analysis.case import Case, dispersion_parameters, make_case
+from ahv_analysis.errors import CampaignError
 from ahv_analysis.record import Array
 from ahv_analysis.tally import Cause, Tally
+from ahv_plant.compiled import source_hash
 from ahv_plant.constants import DEGREES, STEP
 from ahv_plant.dispersion import Dispersion, draw_dispersion
 from ahv_plant.level_trim import LevelTrim
 from ahv_plant.state import State
 
 RUNS_PER_JOB = 64  # four blocks: half a second of work, so that little is lost and little waits
-SAVE_EVERY = 16  # jobs between two writes of the file
+JOBS_UNDER_WAY = 64  # handed to the executor at a time, so that a campaign of any size can wait
+SAVE_EVERY = 1024  # runs between two writes of the file, at least
 # Random starts of section 3.5.2, around the case's own: plus and minus, in the plant's parameters.
 START_SPREAD = {
     "initial.u": 100.0,  # [m/s]
@@ -34,8 +39,7 @@ START_SPREAD = {
 }
 
 
-class CampaignError(Exception):
-    """A campaign that cannot be flown as asked; the message is one sentence."""
+DESCRIBED = {"source", "case", "level", "seed", "random_starts", "parameters"}
 
 
 @dataclass(frozen=True)
@@ -49,8 +53,9 @@ class Campaign:
     random_starts: bool = False
 
     def describe(self) -> dict[str, Any]:
-        """All that decides the result of a run; the number of runs does not."""
+        """All that decides the result of a run: the code too, but not the number of runs."""
         return {
+            "source": source_hash(),
             "case": self.case.name,
             "level": self.level,
             "seed": self.seed,
@@ -85,7 +90,7 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> dict[str, Array]:
     states = np.array([campaign.start(run) for run in runs])
     case = campaign.case
     control, geometric = case.control, case.plant.truth.geometric
-    tallies = fly_block(states, dispersions, control, geometric, case.plant.steps)
+    tallies = fly_block(states, dispersions, case.plant.truth, control, case.plant.steps)
     trims = find_trims(
         dispersions,
         control.outer.altitude,
@@ -93,15 +98,18 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> dict[str, Array]:
         case.plant.initial.mass,
         geometric,
     )
-    return columns(np.array(runs), dispersions, states, tallies, trims)
-
-
-def columns(
-    runs: Array, dispersions: Array, states: Array, tallies: Array, trims: Array
-) -> dict[str, Array]:
-    """Columns of the campaign's file from what the engine gives."""
-    tally = Tally(*tallies.T)
     trim = LevelTrim(*trims.T)
+    return flight_columns(np.array(runs), dispersions, states, tallies) | {
+        "trim_exists": trim.exists == 1.0,
+        "trim_alpha_deg": trim.alpha * DEGREES,
+    }
+
+
+def flight_columns(
+    runs: Array, dispersions: Array, states: Array, tallies: Array
+) -> dict[str, Array]:
+    """Columns of the campaign's file that a flight gives."""
+    tally = Tally(*tallies.T)
     table: dict[str, Array] = {"run": runs}
     table |= {name: dispersions[:, i] for i, name in enumerate(Dispersion._fields)}
     table |= {
@@ -123,8 +131,6 @@ def columns(
         "max_observer_error_dps": tally.max_observer_error * DEGREES,
         "final_altitude_m": tally.final_altitude,
         "final_speed_mps": tally.final_speed,
-        "trim_exists": trim.exists == 1.0,
-        "trim_alpha_deg": trim.alpha * DEGREES,
     }
 
 
@@ -140,27 +146,46 @@ def fly_campaign(
     the executor's to repeat. Interrupted by KeyboardInterrupt, the folder keeps what was flown.
     Raises CampaignError if the folder holds another campaign.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CampaignError(f"{folder} cannot hold a campaign: {error.strerror}") from error
     before = _kept(campaign, folder)
     done = set(before["run"].tolist()) if before else set()
-    jobs = [
+    jobs = (
         (first, min(RUNS_PER_JOB, campaign.runs - first))
         for first in range(0, campaign.runs, RUNS_PER_JOB)
         if not done.issuperset(range(first, min(first + RUNS_PER_JOB, campaign.runs)))
-    ]
-    progress(min(len(done), campaign.runs))
-    futures = [executor.submit(fly_runs, campaign, first, count) for first, count in jobs]
-    count = min(len(done), campaign.runs)
+    )
+    parts = [before] if before else []
+    under_way: set[Future[dict[str, Array]]] = set()
+    count = saved = min(len(done), campaign.runs)
+    progress(count)
     try:
-        for number, future in enumerate(as_completed(futures), 1):
-            count += len(future.result()["run"])
+        while True:
+            for first, runs in islice(jobs, JOBS_UNDER_WAY - len(under_way)):
+                under_way.add(executor.submit(fly_runs, campaign, first, runs))
+            if not under_way:
+                break
+            finished, _ = wait(under_way, return_when=FIRST_COMPLETED)
+            for future in finished:
+                under_way.discard(future)
+                parts.append(future.result())
+                count += len(parts[-1]["run"])
             progress(min(count, campaign.runs))
-            if number % SAVE_EVERY == 0:
-                _write(campaign, folder, before, futures)
+            if count - saved >= max(SAVE_EVERY, saved):  # seldom enough to stay a small part
+                parts, saved = [_write(campaign, folder, parts)], count
     finally:
-        for future in futures:
+        for future in under_way:  # of an interrupted campaign
             future.cancel()
-        _write(campaign, folder, before, futures)
+        parts += [future.result() for future in under_way if _is_flown(future)]
+        if parts:
+            _write(campaign, folder, parts)
     return read_campaign(campaign, folder)
+
+
+def _is_flown(future: Future[dict[str, Array]]) -> bool:
+    return future.done() and not future.cancelled() and future.exception() is None
 
 
 def campaign_file(campaign: Campaign, folder: Path) -> Path:
@@ -181,7 +206,9 @@ def _kept(campaign: Campaign, folder: Path) -> dict[str, Array]:
         return {}
     table, description = read_runs(path)
     if description != json.loads(json.dumps(campaign.describe())):
-        raise CampaignError(f"{path} holds another campaign: choose another --out")
+        raise CampaignError(
+            f"{path} holds another campaign, or one of other code: choose another --out"
+        )
     return table
 
 
@@ -190,9 +217,13 @@ def read_runs(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     try:
         table = pq.read_table(path)
         description = json.loads(table.schema.metadata[b"ahv"])
-    except (OSError, pa.ArrowException, KeyError, TypeError) as error:
-        raise CampaignError(f"{path} is not the file of a campaign: {error}") from error
-    return {name: table[name].to_numpy() for name in table.column_names}, description
+        columns = {name: table[name].to_numpy() for name in table.column_names}
+        if not {"run", "cause"} <= columns.keys() or not set(description) >= DESCRIBED:
+            raise ValueError("it lacks columns or the description")
+    except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise CampaignError(f"{path} is not the file of a campaign: {reason}") from error
+    return columns, description
 
 
 def open_campaign(folder: Path, level: float | None = None) -> Campaign:
@@ -215,26 +246,18 @@ def open_campaign(folder: Path, level: float | None = None) -> Campaign:
 
 
 def _write(
-    campaign: Campaign, folder: Path, before: dict[str, Array], futures: Sequence[Future[Any]]
-) -> None:
-    """Write what was there and what has been flown, sorted by run, whole or not at all."""
-    flown = [
-        future.result()
-        for future in futures
-        if future.done() and not future.cancelled() and future.exception() is None
-    ]
-    parts = [before, *flown] if before else flown
-    if not flown:
-        return
+    campaign: Campaign, folder: Path, parts: Sequence[dict[str, Array]]
+) -> dict[str, Array]:
+    """Write all parts as one file, sorted by run, whole or not at all; returns its columns."""
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     _, order = np.unique(joined["run"], return_index=True)
-    table = pa.table({name: column[order] for name, column in joined.items()})
-    table = table.replace_schema_metadata({"ahv": json.dumps(campaign.describe())})
-    folder.mkdir(parents=True, exist_ok=True)
+    columns = {name: column[order] for name, column in joined.items()}
+    table = pa.table(columns).replace_schema_metadata({"ahv": json.dumps(campaign.describe())})
     path = campaign_file(campaign, folder)
-    draft = path.with_suffix(".part")
+    draft = path.with_suffix(f".{os.getpid()}")
     pq.write_table(table, draft)
     draft.replace(path)
+    return columns
 
 
 def exact_interval(successes: int, runs: int) -> tuple[float, float]:

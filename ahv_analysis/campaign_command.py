@@ -16,8 +16,10 @@ from ahv_analysis.console import (
     HIGHEST_LEVEL,
     Json,
     UsageError,
+    check_domain,
     integer_option,
     one_sentence,
+    print_json,
     progress_bar,
     show_table,
 )
@@ -114,12 +116,11 @@ def fly(
                     raise typer.Exit(130) from None
                 wall = time.perf_counter() - started
             summary = summarize_campaign(campaign, table)
-            fresh = table["run"] >= 0
-            steps = float(table["time_s"][fresh].sum()) / STEP * (1 - begun[0] / runs)
+            steps = float(table["time_s"].sum()) / STEP * (1 - begun[0] / runs)
             summary |= {"trial_steps_per_second": steps / wall, "wall_s": wall}
             summaries.append(summary | {"out": str(folder)})
     if as_json:
-        print(json.dumps(summaries[0] if len(summaries) == 1 else {"levels": summaries}))
+        print_json(summaries[0] if len(summaries) == 1 else {"levels": summaries})
         return
     for summary in summaries:
         _show(summary)
@@ -156,7 +157,7 @@ def _show(summary: dict[str, Any]) -> None:
 @one_sentence
 def rerun(
     folder: Annotated[Path, typer.Argument(help="Folder of a campaign.")],
-    run: Annotated[int, typer.Argument(min=0, help="Number of the run.")],
+    run: Annotated[int, typer.Argument(help="Number of the run.")],
     level: Annotated[float | None, typer.Option(help="Level, if there are several.")] = None,
     graph: Annotated[bool, typer.Option("--graph", help="Fly it on the ROS graph.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for a bag of the run.")] = None,
@@ -166,9 +167,8 @@ def rerun(
     import numpy as np
 
     from ahv_analysis.block import fly_alone
-    from ahv_analysis.campaign import campaign_file, columns, open_campaign, read_runs
+    from ahv_analysis.campaign import campaign_file, flight_columns, open_campaign, read_runs
     from ahv_analysis.flight import fly_library
-    from ahv_analysis.graph_flight import fly_graph
     from ahv_analysis.tally import Cause
 
     campaign = open_campaign(folder, level)
@@ -180,18 +180,13 @@ def rerun(
         )
     case = campaign.case_of(run)
     tally = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
-    alone = columns(
+    alone = flight_columns(
         np.array([run]),
         np.array([case.plant.truth.dispersion]),
         np.array([case.plant.initial]),
         np.array([tally]),
-        np.zeros((1, 4)),
     )
-    differing = [
-        name
-        for name in alone
-        if not name.startswith("trim_") and alone[name][0] != table[name][index[0]]
-    ]
+    differing = [name for name in alone if alone[name][0] != table[name][index[0]]]
     result = {
         "run": run,
         "cause": Cause(int(tally.cause)).name.lower(),
@@ -204,12 +199,17 @@ def rerun(
         bag = (out or folder / f"run-{run}") / "bag"
         if bag.exists():
             raise UsageError(f"{bag} exists already: choose another --out")
-        engine = fly_graph if graph else fly_library
         with progress_bar(f"run {run}", case.plant.steps, as_json) as progress:
-            ended_early, _ = engine(case, bag, progress=progress)
+            if graph:
+                check_domain()
+                from ahv_analysis.graph_flight import fly_graph
+
+                ended_early, _ = fly_graph(case, bag, progress=progress)
+            else:
+                ended_early, _ = fly_library(case, bag, progress=progress)
         result |= {"bag": str(bag), "ended_early": ended_early}
     if as_json:
-        print(json.dumps(result))
+        print_json(result)
     else:
         show_table(f"run {run} again", [(name, str(value)) for name, value in result.items()])
 
@@ -242,7 +242,7 @@ def table(
         try:
             rows = fly_table(out, pool, seed, runs, protected, progress)
         except KeyboardInterrupt:
-            print_interrupted(0, total)
+            print("ahv: interrupted; the same command resumes", file=sys.stderr)
             raise typer.Exit(130) from None
     name = "table_protected" if protected else "table"
     text = markdown(rows)
@@ -253,7 +253,7 @@ def table(
     }
     (out / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
     if as_json:
-        print(json.dumps(content))
+        print_json(content)
     else:
         print(text)
         print(f"{total} flights in {content['wall_s']:.0f} s; kept in {out}")

@@ -124,7 +124,7 @@ def make_case(name: str, given: Mapping[str, Mapping[str, object]]) -> Case:
 def _read(path: Path) -> dict[str, dict[str, object]]:
     """Parameters per node as the file gives them, those of `/**` given to all that know them."""
     try:
-        content = yaml.safe_load(path.read_text())
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
         reason = " ".join(str(error).split())
         raise ParameterError(f"{path.name}: not a readable YAML file: {reason}") from error
@@ -145,6 +145,12 @@ def _read(path: Path) -> dict[str, dict[str, object]]:
         if name not in SHARED:
             raise ParameterError(
                 f"{path.name}: {EVERY_NODE}: {name!r} is not one of {', '.join(SHARED)}"
+            )
+    for section, body in sections.items():
+        twice = sorted(shared.keys() & body.keys()) if section != EVERY_NODE else []
+        if twice:
+            raise ParameterError(
+                f"{path.name}: {twice[0]} stands in {EVERY_NODE} and in {section}; once is enough"
             )
     return {
         node: {name: shared[name] for name in shared if name in {p.name for p in known}}

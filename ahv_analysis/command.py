@@ -14,10 +14,12 @@ from ahv_analysis.console import (
     HIGHEST_LEVEL,
     Json,
     UsageError,
+    check_domain,
     console,
     integer_option,
     number_option,
     one_sentence,
+    print_json,
     progress_bar,
     show_table,
 )
@@ -76,7 +78,7 @@ def trim(
         "within_limits": found.within_limits,
     }
     if as_json:
-        print(json.dumps(values))
+        print_json(values)
     else:
         rows = [
             (name, f"{value:.6g}" if isinstance(value, float) else str(value))
@@ -117,7 +119,6 @@ def fly(
     from ahv_analysis.bag_reader import read_bag
     from ahv_analysis.case import load_case
     from ahv_analysis.flight import fly_library
-    from ahv_analysis.graph_flight import fly_graph
     from ahv_analysis.summary import summarize
 
     changes = _dispersion(dispersion, seed, run)
@@ -130,18 +131,25 @@ def fly(
         if path.exists():
             raise UsageError(f"{path} exists already: choose another --out")
     with progress_bar(f"flying {flight.name}", flight.plant.steps, as_json) as progress:
-        fly_engine = fly_graph if engine == Engine.graph else fly_library
-        ended_early, wall = fly_engine(flight, bag, progress=progress)
+        if engine == Engine.graph:
+            check_domain()
+            from ahv_analysis.graph_flight import fly_graph
+
+            ended_early, wall = fly_graph(flight, bag, progress=progress)
+        else:
+            ended_early, wall = fly_library(flight, bag, progress=progress)
     record = read_bag(bag)
     summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
     summary["dispersion"] = flight.plant.truth.dispersion._asdict()
     summary |= summarize(record, ended_early)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
-    summary_file.write_text(json.dumps(summary, indent=2) + "\n")
+    summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
     if as_json:
-        print(json.dumps(summary))
+        print_json(summary)
     else:
         _print_summary(summary)
+    if ended_early:
+        raise typer.Exit(1)
 
 
 def _dispersion(choice: str | None, seed: int, run: int) -> dict[str, object]:
@@ -210,7 +218,8 @@ def figures(
     if any(source.glob("runs-*.parquet")):
         campaign = open_campaign(source, level)
         found, _ = read_runs(campaign_file(campaign, source))
-        plates, draw = campaign_figures(campaign, found["cause"].tolist(), runs)
+        causes = dict(zip(found["run"].tolist(), found["cause"].tolist(), strict=True))
+        plates, draw = campaign_figures(campaign, causes, runs)
     else:
         plates, draw = bag_figures(source)
     try:
@@ -219,7 +228,7 @@ def figures(
     except OSError as error:
         raise UsageError(f"cannot write figures to {out}: {error}") from error
     if as_json:
-        print(json.dumps({"source": str(source), "figures": [str(path) for path in written]}))
+        print_json({"source": str(source), "figures": [str(path) for path in written]})
     else:
         console.print(f"{len(written)} files in {out}")
 

@@ -1,5 +1,7 @@
 """What the commands share: tables, progress, numbers, and errors in one sentence."""
 
+import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,10 +22,11 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from ahv_analysis.bag_writer import BagError
+from ahv_analysis.errors import BagError, CampaignError, GraphError
 from ahv_msgs_py.parameters import ParameterError
 
 console = Console()
+HIGHEST_DOMAIN = 232
 HIGHEST_LEVEL = 0.9  # [-] of a drawn dispersion
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
@@ -65,15 +68,28 @@ def one_sentence(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def guarded(*arguments: Any, **options: Any) -> None:
-        from ahv_analysis.campaign import CampaignError
-
         try:
             command(*arguments, **options)
-        except (UsageError, ParameterError, BagError, CampaignError) as error:
+        except (UsageError, ParameterError, BagError, CampaignError, OSError) as error:
             print(f"ahv: {error}", file=sys.stderr)
             raise typer.Exit(2) from error
+        except GraphError as error:
+            print(f"ahv: {error}", file=sys.stderr)
+            raise typer.Exit(1) from error
 
     return guarded
+
+
+def check_domain() -> None:
+    """Refuse a ROS domain that Fast DDS would refuse on stdout."""
+    domain = os.environ.get("ROS_DOMAIN_ID", "0")
+    if not (domain.isascii() and domain.isdigit() and int(domain) <= HIGHEST_DOMAIN):
+        raise UsageError(f"ROS_DOMAIN_ID is {domain!r}, but must be 0 to {HIGHEST_DOMAIN}")
+
+
+def print_json(content: dict[str, Any]) -> None:
+    """Print one JSON object; there is no NaN in JSON."""
+    print(json.dumps(content, allow_nan=False))
 
 
 class _RateColumn(ProgressColumn):
@@ -92,7 +108,7 @@ class _RateColumn(ProgressColumn):
 def progress_bar(
     title: str, total: int, hidden: bool, unit: str = "steps"
 ) -> Iterator[Callable[[int], None]]:
-    """Progress on the terminal; the function it gives takes the work done so far."""
+    """Progress on the terminal (stderr); the function it gives takes the work done so far."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -100,7 +116,7 @@ def progress_bar(
         _RateColumn(unit),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, disable=hidden, transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), disable=hidden, transient=True) as bar:
         task = bar.add_task(title, total=total)
         yield lambda done: bar.update(task, completed=done)
 

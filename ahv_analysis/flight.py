@@ -87,12 +87,14 @@ def fly_library(
     """
     bag = BagWriter(path, notes(case))
     started = time.perf_counter()
-    for step in fly(case):
-        write_step(bag, step)
-        if step.stamp % NANOSECONDS == 0:
-            progress(step.stamp // STEP_NS)
+    try:
+        for step in fly(case):
+            write_step(bag, step)
+            if step.stamp % NANOSECONDS == 0:
+                progress(step.stamp // STEP_NS)
+    finally:
+        bag.close()  # whole up to here, even if the flight is interrupted
     wall = time.perf_counter() - started
-    bag.close()
     return step.ended_early, wall
 
 

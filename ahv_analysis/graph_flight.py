@@ -9,6 +9,7 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.case import Case, notes
+from ahv_analysis.errors import GraphError
 from ahv_analysis.flight import fly
 from ahv_analysis.recorder_node import RecorderNode
 from ahv_control.disturbance_learner_node import DisturbanceLearnerNode
@@ -16,7 +17,7 @@ from ahv_control.inner_loop_node import InnerLoopNode
 from ahv_control.outer_intermediate_node import OuterIntermediateNode
 from ahv_control.velocity_node import VelocityNode
 from ahv_msgs_py.base_node import BaseNode
-from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, LoopTopic
+from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
 CONTROLLERS = {
@@ -27,10 +28,6 @@ CONTROLLERS = {
 }
 LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
 LOOK = 0.2  # [s] between looks at the progress
-
-
-class GraphError(RuntimeError):
-    """The graph did not do what a graph must; the message is one sentence."""
 
 
 def controllers(case: Case) -> list[str]:
@@ -77,6 +74,10 @@ def fly_graph(
         started = time.perf_counter()
         _spin(executor, plant, progress)
         wall = time.perf_counter() - started
+        if plant.count_publishers(STATE.name) > 1:
+            raise GraphError(
+                "another plant flew in the same ROS domain: set ROS_DOMAIN_ID to one of your own"
+            )
         if recorder is not None:
             _drain(executor, recorder, loop_topics(case), plant.step)
         return plant.finished.result(), wall
@@ -112,3 +113,9 @@ def _drain(
         executor.spin_once(LOOK)
         if time.monotonic() > deadline:
             raise GraphError(f"the recorder missed {recorder.missing(topics, steps)} messages")
+    surplus = -recorder.balance(topics, steps)
+    if surplus:
+        raise GraphError(
+            f"the bag holds {surplus} messages of another flight: "
+            "set ROS_DOMAIN_ID to one of your own"
+        )

@@ -8,10 +8,18 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from ahv_analysis.bag_writer import BagError, BagWriter
+from ahv_analysis.bag_writer import BagWriter
+from ahv_analysis.errors import BagError
 from ahv_msgs_py.base_node import OK, QOS, VOLATILE_QOS, BaseNode, message_class, run
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
-from ahv_msgs_py.topics import DIAGNOSTICS, LOOP_TOPICS, NOMINAL_TOPICS, VIEWER_TOPICS, LoopTopic
+from ahv_msgs_py.topics import (
+    DIAGNOSTICS,
+    LOOP_TOPICS,
+    NAMESPACE,
+    NOMINAL_TOPICS,
+    VIEWER_TOPICS,
+    LoopTopic,
+)
 
 RECORDER_PARAMETERS = (
     Parameter("bag", "bag", "folder of the bag to write; it must not exist"),
@@ -59,7 +67,7 @@ class RecorderNode(BaseNode):
         """Learn from the plant that the flight is over, and after how many steps."""
         for status in deserialize_message(data, DiagnosticArray).status:
             facts = {fact.key: fact.value for fact in status.values}
-            if "over" in facts:
+            if status.name == f"{NAMESPACE}/plant" and "over" in facts:
                 self._steps = int(facts["steps"])
                 self._flown = [
                     topic
@@ -71,6 +79,10 @@ class RecorderNode(BaseNode):
     def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:
         """How many messages of these topics are still to come from a flight of so many steps."""
         return sum(max(0, steps + 1 - self._bag.counts[topic.name]) for topic in topics)
+
+    def balance(self, topics: Sequence[LoopTopic], steps: int) -> int:
+        """How many messages the bag lacks of a flight of so many steps; negative: others flew."""
+        return sum(steps + 1 - self._bag.counts[topic.name] for topic in topics)
 
     def destroy_node(self) -> None:
         """Close the bag, then the node."""

@@ -1,6 +1,6 @@
 """Which figures of the report a bag or a campaign is for, and the flights that they show."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -55,15 +55,16 @@ def _fly(case: Case) -> FlightRecord:
 
 
 def campaign_figures(
-    campaign: Campaign, causes: Sequence[int], runs: int
+    campaign: Campaign, causes: Mapping[int, int], runs: int
 ) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
-    """Which figures a campaign is for, and how to draw one with its first `runs` runs.
+    """Which figures a campaign is for, and how to draw one with the first `runs` of its runs.
 
-    The runs are flown again, so that a campaign of any size keeps no trajectory.
+    `causes` has the cause of failure of every run flown, zero for success. The runs are flown
+    again, so that a campaign of any size keeps no trajectory.
     """
-    cases = [campaign.case_of(run) for run in range(min(runs, len(causes)))]
-    flights = [fly_trajectory(case, DRAWN_EVERY) for case in cases]
-    failed = [causes[run] != 0 for run in range(len(flights))]
+    drawn = sorted(causes)[:runs]
+    flights = [fly_trajectory(campaign.case_of(run), DRAWN_EVERY) for run in drawn]
+    failed = [causes[run] != 0 for run in drawn]
     control = campaign.case.control
     if control.learner is None:
         plates = CAMPAIGN_3

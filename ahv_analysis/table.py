@@ -29,9 +29,8 @@ CONTROLLERS = ("neuro_adaptive_sc_gdi", "neuro_adaptive_di")
 class Row(NamedTuple):
     """A cell of the table: the report's count and ours."""
 
-    controller: str
-    protected: bool
-    reported: int  # successes
+    trials: int  # of the report
+    reported: int  # successes of the report
     reported_interval: tuple[float, float]
     flown: dict[str, Any]  # summary of the campaign
 
@@ -68,8 +67,7 @@ def fly_table(
             successes = reported.successes[controller]
             rows.append(
                 Row(
-                    controller,
-                    protected,
+                    reported.trials,
                     successes,
                     exact_interval(successes, reported.trials),
                     summarize_campaign(campaign, table),
@@ -97,10 +95,9 @@ def markdown(rows: Sequence[Row]) -> str:
     ]
     for row in rows:
         flown = row.flown
-        trials = next(item.trials for item in REPORT if item.level == flown["level"])
         lines.append(
             f"| {flown['controller']} | {100 * flown['level']:.0f} % | {flown['runs']} "
-            f"| {100 * row.reported / trials:.2f} | {percent(row.reported_interval)} "
+            f"| {100 * row.reported / row.trials:.2f} | {percent(row.reported_interval)} "
             f"| {100 * flown['success_rate']:.2f} | {percent(flown['interval'])} | {row.verdict} "
             f"| {100 * flown['trim_within_5_deg'] / flown['runs']:.2f} |"
         )

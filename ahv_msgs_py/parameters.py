@@ -1,6 +1,7 @@
 """Parameters of the nodes: name, unit, range and meaning, checked alike with and without ROS."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from math import isfinite
 from typing import NamedTuple
 
@@ -39,8 +40,9 @@ class Parameter(NamedTuple):
     def check(self, node: str, value: object) -> Value:
         """`value` in the type of the parameter, or ParameterError."""
         wanted = type(self.default)
-        if wanted is float and type(value) is int:
-            value = float(value)
+        if wanted is float and type(value) in (int, str):
+            with suppress(ValueError):  # a text that is no number is refused below
+                value = float(value)  # type: ignore[arg-type]
         fits = isinstance(value, wanted) and type(value) is wanted
         if fits and isinstance(value, int | float) and not isinstance(value, bool):
             fits = isfinite(value)

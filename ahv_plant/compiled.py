@@ -22,7 +22,7 @@ from numba.extending import overload
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def _source_hash() -> str:
+def source_hash() -> str:
     """Hash the sources of all compiled code.
 
     Numba looks only at the file of the function that it caches; a callee changed in another file
@@ -38,7 +38,7 @@ def _source_hash() -> str:
 
 def _cache_directory() -> Path:
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "ahv" / _source_hash()
+    return Path(base) / "ahv" / source_hash()
 
 
 _CACHE = _cache_directory()

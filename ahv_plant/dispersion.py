@@ -106,7 +106,8 @@ def disturbance_acceleration(
 ) -> tuple[float, float, float]:
     """d(t, X) [rad/s^2] on the rates of P, Q, R; zero for None, at no cost in compiled code."""
     if disturbance is None:
-        return 0.0, 0.0, 0.0
+        zero = select(P == P, 0.0, 0.0)  # as wide as P, so that both branches are of one type
+        return zero, zero, zero
     return (
         axis_disturbance(disturbance.P, time, P, Q, R),
         axis_disturbance(disturbance.Q, time, P, Q, R),

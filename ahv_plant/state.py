@@ -60,5 +60,6 @@ def limit_surfaces(surfaces: Surfaces) -> Surfaces:
 
 @elementwise
 def limit_throttle(throttle: float) -> float:
-    """Hold sigma_T within [0.1, 0.9] (section 3.5.2)."""
-    return clamp(throttle, THROTTLE_MINIMUM, THROTTLE_MAXIMUM)
+    """Hold sigma_T within [0.1, 0.9] (section 3.5.2); what is not a number becomes the least."""
+    held = clamp(throttle, THROTTLE_MINIMUM, THROTTLE_MAXIMUM)
+    return select(held == held, held, THROTTLE_MINIMUM)

@@ -167,12 +167,12 @@ def bench_lanes() -> None:
     result = np.empty((1, LANES))
     chains = 20_000_000
     truth = case.plant.truth
-    fly_block(starts, vehicles, case.control, False, 2)
+    fly_block(starts, vehicles, case.plant.truth, case.control, 2)
     fly_alone(case.plant.initial, truth, case.control, 2)
     multiply_add(numbers, 10, result)
     lanes, alone, peaks = [], [], []
     for _ in range(ROUNDS):
-        wall = timed(lambda: fly_block(starts, vehicles, case.control, False, steps))
+        wall = timed(lambda: fly_block(starts, vehicles, case.plant.truth, case.control, steps))
         lanes.append(wall / steps / LANES)
         wall = timed(lambda: fly_alone(case.plant.initial, truth, case.control, steps))
         alone.append(wall / steps)

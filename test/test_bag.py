@@ -7,8 +7,9 @@ import pytest
 from rclpy.serialization import serialize_message
 
 from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.bag_writer import BagError, BagWriter
+from ahv_analysis.bag_writer import BagWriter
 from ahv_analysis.case import load_case
+from ahv_analysis.errors import BagError
 from ahv_analysis.flight import fly, fly_library
 from ahv_analysis.record import record
 from ahv_msgs_py.topics import CLOCK, LOOP_TOPICS

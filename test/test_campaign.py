@@ -1,6 +1,7 @@
 """A campaign is its runs: whatever flies them, wherever it stopped, each can be flown again."""
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -9,13 +10,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from scipy.stats import beta
 
+from ahv_analysis.block import fly_alone
 from ahv_analysis.campaign import (
     Campaign,
-    CampaignError,
     campaign_file,
     exact_interval,
     fly_campaign,
@@ -24,6 +26,8 @@ from ahv_analysis.campaign import (
     summarize_campaign,
 )
 from ahv_analysis.case import load_case
+from ahv_analysis.errors import CampaignError
+from ahv_analysis.report_figures import campaign_figures
 from ahv_analysis.table import CONTROLLERS, REPORT, fly_table, markdown
 from test.test_command import ahv
 
@@ -140,6 +144,50 @@ def test_random_starts_spread_as_section_3_5_2_says():
         assert 4.8 < np.degrees(np.max(np.abs(names[rate]))) <= 5.0 + 1e-9
     for still in ("v", "w", "phi", "theta", "psi", "x", "y", "mass"):
         assert not np.any(names[still])
+
+
+def test_a_campaign_flies_the_disturbance_of_its_case(tmp_path):
+    push = {"duration": 2.0, "disturbance.P.constant": 2.0, "disturbance.R.amplitude": 1.0}
+    pushed = Campaign(load_case("neuro_adaptive_di", push), 0.2, 20, 1)
+    with ThreadPoolExecutor(1) as pool:
+        table = fly_campaign(pushed, tmp_path, pool)
+    assert np.all(table["max_abs_phi_deg"] > 1e-3)
+    one = pushed.case_of(7)
+    alone = fly_alone(one.plant.initial, one.plant.truth, one.control, one.plant.steps)
+    assert math.degrees(alone.max_abs_phi) == table["max_abs_phi_deg"][7]
+
+
+def test_figures_of_a_campaign_with_gaps_mark_the_runs_that_failed():
+    causes = {run: int(run == 70) for run in range(64, 80)}
+    _, draw = campaign_figures(campaign(), causes, 10)
+    assert draw.keywords["failed"] == [run == 70 for run in range(64, 74)]
+    start = campaign().case_of(64)
+    assert np.array_equal(draw.keywords["flights"][0].states[0], start.plant.initial)
+
+
+def damaged(path, kind):
+    if kind == "no parquet":
+        path.write_text("hello")
+    elif kind == "a folder":
+        path.mkdir()
+    else:
+        table = pa.table({"other" if kind == "no runs" else "run": [1]})
+        described = {
+            "no description": {},
+            "bad description": {"ahv": "{"},
+            "no runs": {"ahv": "{}"},
+        }
+        pq.write_table(table.replace_schema_metadata(described[kind]), path)
+
+
+@pytest.mark.parametrize(
+    "kind", ["no parquet", "a folder", "no description", "bad description", "no runs"]
+)
+def test_a_damaged_campaign_is_named(tmp_path, kind):
+    path = tmp_path / "runs-0.3.parquet"
+    damaged(path, kind)
+    with pytest.raises(CampaignError, match=r"runs-0\.3\.parquet is not the file of a campaign"):
+        open_campaign(tmp_path)
 
 
 @pytest.mark.parametrize("successes, runs", [(0, 50), (50, 50), (3580, 3602)])
@@ -260,6 +308,8 @@ def test_ctrl_c_keeps_what_was_flown(tmp_path):
         (("monte-carlo", "rerun", "nowhere", 1), ("nowhere", "none")),
         (("table", "--runs", "many"), ("--runs", "many")),
         (("figures", ".", "--out", "x"), ("not a bag",)),
+        (("monte-carlo", "--runs", 1, "--out", sys.executable), ("cannot hold a campaign",)),
+        (("monte-carlo", "--runs", 1, "--dask", "tcp://127.0.0.1:9"), ("no dask scheduler",)),
     ],
 )
 def test_wrong_input_is_named(arguments, words, tmp_path):

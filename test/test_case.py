@@ -72,6 +72,7 @@ def test_shared_parameters_reach_every_node_that_knows_them(tmp_path):
         ),
         (("  ros__parameters:\n    k_P", "  parameters:\n    k_P"), ("/ahv/inner_loop", "ros__")),
         (("/ahv/velocity:", "]["), ("not a readable YAML",)),
+        (("k_P: 2.0", "geometric_altitude: true"), ("geometric_altitude", "/**", "once")),
     ],
 )
 def test_a_wrong_case_is_named(tmp_path, change, words):
@@ -84,6 +85,13 @@ def test_a_wrong_case_is_named(tmp_path, change, words):
     assert "wrong" in sentence or "plant" in sentence
     assert all(word in sentence for word in words), sentence
     assert "\n" not in sentence
+
+
+def test_a_number_may_be_written_as_people_do(tmp_path):
+    path = tmp_path / "scientific.yaml"
+    path.write_text(TEXT.replace("k_h: 0.01", "k_h: 1e-2").replace("k_P: 2.0", "k_P: 2"))
+    case = load_case(str(path))
+    assert case.control.outer.k_h == 0.01 and case.control.inner.tracking.gain.P == 2.0
 
 
 def test_an_unknown_case_lists_the_known_ones():

@@ -110,6 +110,8 @@ def test_figures_of_a_bag(flown, tmp_path):
         (("fly", "nominal_di", "--engine", "warp"), ("--engine", "warp", "graph")),
         (("figures", "nothing", "--out", "x"), ("nothing is not a bag",)),
         (("trim", "--altitude", "high"), ("--altitude", "high")),
+        (("fly", "nominal_di", "--out", sys.executable), (sys.executable,)),
+        (("fly", "n" * 300), ("name too long",)),
     ],
 )
 def test_wrong_input_is_named(arguments, words, tmp_path):
@@ -128,3 +130,33 @@ def test_a_flight_is_never_overwritten(flown):
     assert result.returncode == 2
     assert f"{out / 'bag'} exists already" in result.stderr
     assert (out / "summary.json").read_bytes() == before
+
+
+def test_a_flight_that_ends_early_says_so_by_its_exit_code(tmp_path):
+    out = tmp_path / "lost"
+    result = ahv("fly", "nominal_di_dispersed", "--engine", "library", "--out", out, "--json")
+    assert result.returncode == 1
+    summary = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(name))
+    assert summary["ended_early"] and summary["success"] is False
+    assert summary["steps"] < 15000
+
+
+def test_a_domain_that_ros_refuses_is_named(tmp_path):
+    result = ahv("fly", "nominal_di", "--json", domain="abc", cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stdout == "" and "ROS_DOMAIN_ID is 'abc'" in result.stderr
+
+
+def test_the_library_engine_needs_no_ros(tmp_path):
+    """The whole way of a flight and its figures without rclpy to import."""
+    program = (
+        "import sys; sys.modules['rclpy'] = None\n"
+        "from ahv_analysis.command import app\n"
+        f"out = {str(tmp_path)!r}\n"
+        "fly = ['fly', 'neuro_adaptive_di', '--engine', 'library', '--duration', '0.5']\n"
+        "app([*fly, '--out', out], standalone_mode=False)\n"
+        "app(['figures', out + '/bag', '--out', out + '/figures'], standalone_mode=False)\n"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "figures" / "figure_4_1.png").exists()

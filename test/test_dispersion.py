@@ -18,15 +18,20 @@ from ahv_control.parameters import (
     VELOCITY_PARAMETERS,
 )
 from ahv_msgs_py.parameters import ParameterError
+from ahv_plant.aerodynamics import aerodynamic_coefficients, air_data, loads
+from ahv_plant.constants import GRAVITY
 from ahv_plant.dispersion import (
     NOMINAL,
     AxisDisturbance,
     Dispersion,
     Disturbance,
     Truth,
+    disperse_coefficients,
+    disperse_inertia,
     disturbance_acceleration,
     draw_dispersion,
 )
+from ahv_plant.mass_properties import Inertia, centre_of_gravity, inertia
 from ahv_plant.state import Surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import STATES, SURFACES, between
@@ -70,21 +75,34 @@ def test_a_dispersion_changes_the_plant_alone(dispersion):
         assert node == "plant" or changed.parameters[node] == parameters
 
 
+@pytest.mark.parametrize("name", Dispersion._fields)
+@given(STATES, SURFACES, between(0.5, 1.5))
+def test_every_multiplier_multiplies_what_it_names(name, state, surfaces, factor):
+    by = Dispersion(**{name: factor})
+    if name in Inertia._fields:
+        nominal = inertia(state.mass)
+        expected = nominal._replace(**{name: getattr(nominal, name) * factor})
+        assert disperse_inertia(nominal, by) == expected
+    else:
+        nominal = aerodynamic_coefficients(air_data(state, False), state, surfaces)
+        expected = nominal._replace(**{name: getattr(nominal, name) * factor})
+        assert disperse_coefficients(nominal, by) == expected
+
+
 @given(STATES, SURFACES, MULTIPLIERS)
-def test_every_multiplier_multiplies_what_it_names(state, surfaces, by):
-    level = state._replace(phi=0.0, theta=0.0, P=0.0, Q=0.0, R=0.0)
-    nominal = state_rate(level, surfaces, 0.2, 0.0, NOMINAL)
-    inertias = by._replace(CL=1.0, CD=1.0, CY=1.0, Cl=1.0, Cm=1.0, Cn=1.0)
-    true = state_rate(level, surfaces, 0.2, 0.0, Truth(dispersion=inertias))
-    # without rates only the moments accelerate the body
-    expected = (nominal.P / by.Ixx, nominal.Q / by.Iyy, nominal.R / by.Izz)
-    assert pytest.approx(expected, rel=1e-12, abs=1e-15) == (true.P, true.Q, true.R)
-    assert true[:3] == nominal[:3]
-    rolling = state_rate(level, surfaces, 0.2, 0.0, Truth(dispersion=Dispersion(Cl=by.Cl)))
-    assert pytest.approx(nominal.P * by.Cl, rel=1e-12, abs=1e-15) == rolling.P
-    assert rolling.Q == nominal.Q
-    sideways = state_rate(level, surfaces, 0.2, 0.0, Truth(dispersion=Dispersion(CY=by.CY)))
-    assert sideways.v == pytest.approx(nominal.v * by.CY, rel=1e-9, abs=1e-9)
+def test_the_dispersed_vehicle_accelerates_by_its_own_forces_and_inertias(state, surfaces, by):
+    still = state._replace(phi=0.0, theta=0.0, P=0.0, Q=0.0, R=0.0)
+    air = air_data(still, False)
+    own = disperse_coefficients(aerodynamic_coefficients(air, still, surfaces), by)
+    total = loads(air, own, centre_of_gravity(still.mass))
+    body = disperse_inertia(inertia(still.mass), by)
+    true = state_rate(still, surfaces, 0.0, 0.0, Truth(dispersion=by))
+    assert (true.u, true.v, true.w - GRAVITY) == pytest.approx(
+        [force / still.mass for force in total[:3]], rel=1e-9, abs=1e-9
+    )
+    assert pytest.approx(
+        [moment / own for moment, own in zip(total[3:], body, strict=True)], rel=1e-9, abs=1e-12
+    ) == (true.P, true.Q, true.R)
 
 
 @given(STATES, SURFACES)

@@ -11,10 +11,10 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.bag_writer import BagError
 from ahv_analysis.case import case_names, load_case
+from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight import fly, fly_library
-from ahv_analysis.graph_flight import GraphError, fly_graph
+from ahv_analysis.graph_flight import fly_graph
 from ahv_analysis.record import record
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, LOOP_TOPICS, NOMINAL_TOPICS, ODOMETRY, STATE

@@ -174,7 +174,7 @@ def track(disturbance, seconds, settings=SETTINGS):
 def test_the_estimate_converges_to_the_disturbance(name, disturbance, bound):
     time, errors = track(disturbance, 30.0)
     true = np.array([disturbance(t, np.zeros(3)) for t in time])
-    assert np.max(np.abs(errors[time < 0.05])) > 2 * bound or np.max(np.abs(true[0])) < bound
+    assert np.max(np.abs(true)) > 2 * bound  # or there would be nothing to learn
     assert np.max(np.abs(errors[time > 5.0])) < bound, name
     if name != "sine":  # within the span of the basis: it goes on converging
         early, late = errors[(time > 5.0) & (time < 15.0)], errors[time > 20.0]
