@@ -10,7 +10,7 @@ from ahv_control.flight_control import (
     FlightControl,
     adaptive_control,
     first_learner,
-    next_learner,
+    next_adaptive_control,
     nominal_control,
 )
 from ahv_plant.compiled import kernel
@@ -38,10 +38,8 @@ def fly_adaptive(state, truth, control, steps):
         observed = observer_error(state, learner)
         tally = count_step(tally, state, answer, observed, altitude, truth.geometric)
         later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        learner = next_learner(
-            learner, state, answer.surfaces, answer.rates, later, control.learner
-        )
-        answer = widen(adaptive_control(later, learner, answer.surfaces, control), one)
+        learner, answer = next_adaptive_control(learner, state, answer, later, control)
+        answer = widen(answer, one)
         state = later
     observed = observer_error(state, learner)
     return count_step(tally, state, answer, observed, altitude, truth.geometric)
@@ -94,10 +92,7 @@ def adaptive_trajectory(state, truth, control, steps, every, states, commands):
         if departure(state, truth.geometric) != 0:
             return step
         later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        learner = next_learner(
-            learner, state, answer.surfaces, answer.rates, later, control.learner
-        )
-        answer = adaptive_control(later, learner, answer.surfaces, control)
+        learner, answer = next_adaptive_control(learner, state, answer, later, control)
         state = later
     return steps
 

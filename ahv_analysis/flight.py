@@ -11,10 +11,9 @@ from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.flight_control import (
     NEUTRAL,
     Commands,
-    FlightControl,
     adaptive_control,
     first_learner,
-    next_learner,
+    next_adaptive_control,
     nominal_control,
 )
 from ahv_control.intermediate_loop import Rates
@@ -33,7 +32,7 @@ from ahv_msgs_py.topics import (
 )
 from ahv_plant.constants import STEP, STEP_NS
 from ahv_plant.departure import departure_reason
-from ahv_plant.state import State, Surfaces
+from ahv_plant.state import State
 from ahv_plant.vehicle import vehicle_step
 
 
@@ -51,7 +50,10 @@ def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the vehicle departs from the model."""
     state, truth, control = case.plant.initial, case.plant.truth, case.control
     learner = None if control.learner is None else first_learner(state)
-    commands = _answer(state, learner, NEUTRAL, control)
+    if learner is None:
+        commands = nominal_control(state, NEUTRAL, control)
+    else:
+        commands = adaptive_control(state, learner, NEUTRAL, control)
     for step in range(case.plant.steps):
         later = State(
             *vehicle_step(state, commands.surfaces, commands.throttle, step * STEP, truth)
@@ -60,21 +62,12 @@ def fly(case: Case) -> Iterator[Step]:
         yield Step(step * STEP_NS, state, commands, learner, reason)
         if reason:
             return
-        if learner is not None:
-            learner = next_learner(
-                learner, state, commands.surfaces, commands.rates, later, control.learner
-            )
-        commands = _answer(later, learner, commands.surfaces, control)
+        if learner is None:
+            commands = nominal_control(later, commands.surfaces, control)
+        else:
+            learner, commands = next_adaptive_control(learner, state, commands, later, control)
         state = later
     yield Step(case.plant.steps * STEP_NS, state, commands, learner, "")
-
-
-def _answer(
-    state: State, learner: LearnerState | None, previous: Surfaces, control: FlightControl
-) -> Commands:
-    if learner is None:
-        return nominal_control(state, previous, control)
-    return adaptive_control(state, learner, previous, control)
 
 
 def fly_library(

@@ -88,3 +88,12 @@ def next_learner(
         Rates(now.P, now.Q, now.R),
         settings,
     )
+
+
+@elementwise
+def next_adaptive_control(
+    learner: LearnerState, before: State, answer: Commands, now: State, settings: FlightControl
+) -> tuple[LearnerState, Commands]:
+    """Learner and commands at the state `now`; `answer` was the one to the state `before`."""
+    learned = next_learner(learner, before, answer.surfaces, answer.rates, now, settings.learner)
+    return learned, adaptive_control(now, learned, answer.surfaces, settings)
