@@ -97,6 +97,9 @@ def fly(
     engine: Annotated[
         Engine, typer.Option(help="The ROS graph, or the same laws in this process.")
     ] = Engine.graph,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="100 Hz by the wall clock, not lockstep.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for the bag and the summary, which must not have them."),
@@ -135,7 +138,7 @@ def fly(
             check_domain()
             from ahv_analysis.graph_flight import fly_graph
 
-            ended_early, wall = fly_graph(flight, bag, progress=progress)
+            ended_early, wall = fly_graph(flight, bag, realtime=realtime, progress=progress)
         else:
             ended_early, wall = fly_library(flight, bag, progress=progress)
     record = read_bag(bag)

@@ -16,7 +16,7 @@ from ahv_control.disturbance_learner_node import DisturbanceLearnerNode
 from ahv_control.inner_loop_node import InnerLoopNode
 from ahv_control.outer_intermediate_node import OuterIntermediateNode
 from ahv_control.velocity_node import VelocityNode
-from ahv_msgs_py.base_node import BaseNode
+from ahv_msgs_py.base_node import REALTIME, BaseNode
 from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
@@ -45,11 +45,13 @@ def fly_graph(
     bag: Path | None,
     *,
     domain: int | None = None,
+    realtime: bool = False,
     progress: Callable[[int], None] = lambda steps: None,
 ) -> tuple[str, float]:
     """Fly `case` on a graph of its own context; record to `bag` unless that is None.
 
-    `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did
+    In lockstep, or with `realtime` at 100 Hz by the wall clock. `progress(steps)` is called now
+    and then. Returns why the flight ended early (empty if it did
     not) and the seconds from the first state to the last command. Raises ParameterError for
     settings that a node refuses and GraphError if the graph stops.
     """
@@ -58,19 +60,23 @@ def fly_graph(
     rclpy.init(context=context, domain_id=domain)
     executor = EventsExecutor(context=context)
     nodes: list[BaseNode] = []
+    mode = {REALTIME.name: realtime}
     try:
         recorder = None
         if bag is not None:
-            recorder = RecorderNode({"bag": str(bag), "notes": notes(case)}, context)
+            recorder = RecorderNode({"bag": str(bag), "notes": notes(case)} | mode, context)
             nodes.append(recorder)
-        nodes += [CONTROLLERS[name](case.parameters[name], context) for name in controllers(case)]
+        nodes += [
+            CONTROLLERS[name](case.parameters[name] | mode, context) for name in controllers(case)
+        ]
         listeners = len(nodes)
-        plant = PlantNode(case.parameters["plant"] | {"listeners": listeners}, context)
+        plant = PlantNode(case.parameters["plant"] | mode | {"listeners": listeners}, context)
         nodes.append(plant)
-        for node in nodes:
-            executor.add_node(node)
         for _ in zip(range(2), fly(case), strict=False):
             pass  # compile the laws before the clock runs
+        for node in nodes:
+            node.bring_up()
+            executor.add_node(node)
         started = time.perf_counter()
         _spin(executor, plant, progress)
         wall = time.perf_counter() - started
@@ -108,11 +114,11 @@ def _drain(
     executor: EventsExecutor, recorder: RecorderNode, topics: Sequence[LoopTopic], steps: int
 ) -> None:
     """Let the recorder take what is still under way."""
-    deadline = time.monotonic() + LONGEST_SILENCE
-    while recorder.missing(topics, steps):
-        executor.spin_once(LOOK)
-        if time.monotonic() > deadline:
-            raise GraphError(f"the recorder missed {recorder.missing(topics, steps)} messages")
+    executor.spin_until_future_complete(recorder.finished, LONGEST_SILENCE)
+    if recorder.realtime:
+        return  # messages may be missing, and are counted
+    if not recorder.finished.done():
+        raise GraphError(f"the recorder missed {recorder.missing(topics, steps)} messages")
     surplus = -recorder.balance(topics, steps)
     if surplus:
         raise GraphError(

@@ -10,7 +10,9 @@ from rclpy.serialization import deserialize_message
 
 from ahv_analysis.bag_writer import BagWriter
 from ahv_analysis.errors import BagError
-from ahv_msgs_py.base_node import OK, QOS, VOLATILE_QOS, BaseNode, message_class, run
+from ahv_msgs_py.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.health import OK
+from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import (
     DIAGNOSTICS,
@@ -27,6 +29,9 @@ RECORDER_PARAMETERS = (
 )
 
 
+QUIET = 0.5  # [s] after the end of a flight in real time, for what is still under way
+
+
 class RecorderNode(BaseNode):
     """Listens to every topic; the bag is complete once the node is destroyed.
 
@@ -38,29 +43,41 @@ class RecorderNode(BaseNode):
     ):
         """`values` overrides parameters; ParameterError if the bag cannot be made."""
         super().__init__("recorder", RECORDER_PARAMETERS, values, context)
-        try:
-            self._bag = BagWriter(Path(str(self.settings["bag"])), str(self.settings["notes"]))
-        except BagError as error:
-            raise ParameterError(f"recorder: bag: {error}") from error
+        self._bag: BagWriter | None = None
         self._steps: int | None = None  # of the flight, once it is over
         self._flown: Sequence[LoopTopic] = ()  # topics of the loop that flew
-        topics = [(topic.name, topic.layout.type_name, QOS) for topic in LOOP_TOPICS]
-        topics += [
-            (topic.name, topic.type_name, QOS if topic.durable else VOLATILE_QOS)
-            for topic in VIEWER_TOPICS
-        ]
-        for name, type_name, quality in topics:
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Make the bag."""
+        try:
+            self._bag = BagWriter(Path(str(settings["bag"])), str(settings["notes"]))
+        except BagError as error:
+            raise ParameterError(f"recorder: bag: {error}") from error
+
+    def start(self) -> None:
+        """Listen to every topic; in real time as in lockstep nothing may be missed."""
+        durable = not self.realtime
+        topics = [(topic.name, topic.layout.type_name, durable) for topic in LOOP_TOPICS]
+        topics += [(topic.name, topic.type_name, topic.durable) for topic in VIEWER_TOPICS]
+        for name, type_name, durable in topics:
             try:
                 message_type = message_class(type_name)
             except ModuleNotFoundError:
                 continue  # /tf without tf2_msgs installed: then nobody here can send it either
             write = self._write_status if name == DIAGNOSTICS.name else partial(self._write, name)
-            self.create_subscription(message_type, name, write, quality, raw=True)
-        self.report(0, OK, f"recording to {self._bag.path}")
+            subscription = self.create_subscription(
+                message_type, name, write, quality(durable), raw=True
+            )
+            self._opened.append(partial(self.destroy_subscription, subscription))
+        self.announce(0, OK, f"recording to {self._bag.path}")
 
     def _write(self, topic: str, data: bytes) -> None:
         self._bag.write(topic, data)
-        if self._steps is not None and not self.missing(self._flown, self._steps):
+        if self._steps is not None and not self.realtime:
+            self._end_if_complete()
+
+    def _end_if_complete(self) -> None:
+        if not self.missing(self._flown, self._steps) and not self.finished.done():
             self.finished.set_result("")
 
     def _write_status(self, data: bytes) -> None:
@@ -74,6 +91,8 @@ class RecorderNode(BaseNode):
                     for topic in LOOP_TOPICS
                     if topic in NOMINAL_TOPICS or self.count_publishers(topic.name)
                 ]
+                if self.realtime:  # messages may be missing; what comes comes soon
+                    self.create_timer(QUIET, partial(self.finished.set_result, ""))
         self._write(DIAGNOSTICS.name, data)
 
     def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:
@@ -86,7 +105,8 @@ class RecorderNode(BaseNode):
 
     def destroy_node(self) -> None:
         """Close the bag, then the node."""
-        self._bag.close()
+        if self._bag is not None:
+            self._bag.close()
         super().destroy_node()
 
 

@@ -3,13 +3,15 @@
 import rclpy
 
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
-from ahv_control.flight_control import first_learner, next_learner
+from ahv_control.flight_control import NEUTRAL, first_learner, next_learner
 from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.parameters import LEARNER_PARAMETERS, learner_settings
-from ahv_msgs_py.base_node import OK, BaseNode, run
+from ahv_msgs_py.base_node import BaseNode
+from ahv_msgs_py.faults import Fault
+from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Stepwise, Values
+from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,
@@ -17,14 +19,20 @@ from ahv_msgs_py.topics import (
     STATE,
     SURFACE_COMMAND,
 )
-from ahv_plant.constants import STEP_NS
+from ahv_plant.constants import DEGREES, STEP_NS
+from ahv_plant.parameters import DEFAULT_START
 from ahv_plant.state import State, Surfaces
+
+
+def nothing(last: Values | None, age: int) -> None:
+    """Stand in for what is missing: there is nothing to learn from an incomplete step."""
 
 
 class DisturbanceLearnerNode(BaseNode):
     """Answers every state with the disturbance estimate and the state of the learner.
 
-    To learn from state k it needs state k - 1 and the commands that answered that one.
+    To learn from state k it needs state k - 1 and the commands that answered that one. Where one
+    of them is missing, in real time, the observer starts anew at the state; the weights stay.
     """
 
     def __init__(
@@ -32,44 +40,81 @@ class DisturbanceLearnerNode(BaseNode):
     ):
         """`values` overrides parameters."""
         super().__init__("disturbance_learner", LEARNER_PARAMETERS, values, context)
-        self._law = learner_settings(self.settings)
-        self._learner: LearnerState | None = None
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Make the law."""
+        self._law = learner_settings(settings)
+        still, start = Rates(0.0, 0.0, 0.0), DEFAULT_START  # compiled before it flies
+        learner = next_learner(first_learner(start), start, NEUTRAL, still, start, self._law)
+        disturbance_estimate(learner, still)
+
+    def start(self) -> None:
+        """Open the topics; nothing is known yet."""
+        self.new_flight()
         self._send_learner = self.sender(LEARNER)
         self._send_estimate = self.sender(DISTURBANCE_ESTIMATE)
-        steps = Stepwise(("before", "command", "surfaces", "now"), self._learn)
-        self._put = steps.put
+        inputs = ("now", "before", "command", "surfaces")
+        fallbacks = dict.fromkeys(inputs[1:], nothing)
+        self._put = self.join(inputs, self._learn, fallbacks, wait=False)
         self.receive(STATE, self._state_arrived)
         self.receive(RATE_COMMAND, lambda stamp, values: self._put("command", stamp, values))
         self.receive(SURFACE_COMMAND, lambda stamp, values: self._put("surfaces", stamp, values))
 
+    def new_flight(self) -> None:
+        """Forget what was learned."""
+        self._learner: LearnerState | None = None
+
     def _state_arrived(self, stamp: int, values: Values) -> None:
-        """File a state twice: as the start of its own step and as the end of the one before."""
+        """File a state twice: as the end of the step before, and as the start of its own."""
         if self._learner is None:
             state = State(*values)
             self._publish(stamp, state, first_learner(state))
+        else:
+            self._put("now", stamp - STEP_NS, values)
         self._put("before", stamp, values)
-        self._put("now", stamp - STEP_NS, values)
 
     def _learn(
-        self, stamp: int, before: Values, command: Values, surfaces: Values, now: Values
+        self,
+        stamp: int,
+        now: Values,
+        before: Values | None,
+        command: Values | None,
+        surfaces: Values | None,
     ) -> None:
+        assert self._learner is not None
         state = State(*now)
-        learner = next_learner(
-            self._learner,
-            State(*before),
-            Surfaces(*surfaces),
-            Rates(*command),
-            state,
-            self._law,
-        )
+        if before is None or command is None or surfaces is None:
+            learner = self._anew(state)
+        else:
+            learner = next_learner(
+                self._learner,
+                State(*before),
+                Surfaces(*surfaces),
+                Rates(*command),
+                state,
+                self._law,
+            )
+            error = max(
+                abs(rate - observed)
+                for rate, observed in zip((state.P, state.Q, state.R), learner.X_a, strict=True)
+            )
+            self.health.extreme("barrier_share", error * DEGREES / self._law.k_b)
+            if error * DEGREES >= self._law.k_b:
+                self.fault(stamp, Fault.BARRIER_BREACH, f"{error * DEGREES:.3g} deg/s")
+                learner = self._anew(state)
         self._publish(stamp + STEP_NS, state, learner)
+
+    def _anew(self, state: State) -> LearnerState:
+        """Observer at the state, with the weights so far."""
+        assert self._learner is not None
+        start = first_learner(state)
+        return self._learner._replace(X_a=start.X_a, X_d=start.X_d)
 
     def _publish(self, stamp: int, state: State, learner: LearnerState) -> None:
         self._learner = learner
         estimate = disturbance_estimate(learner, Rates(state.P, state.Q, state.R))
         self._send_learner(stamp, learner_values(learner))
         self._send_estimate(stamp, estimate_values(estimate))
-        self.report(stamp, OK, "learning")
 
 
 def main() -> None:

@@ -3,22 +3,46 @@
 import rclpy
 
 from ahv_control.flight_control import NEUTRAL
-from ahv_control.inner_loop import adaptive_surfaces, nominal_surfaces
+from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
 from ahv_control.intermediate_loop import Rates
-from ahv_control.learner_message import learned_of
+from ahv_control.learner_message import learned_of, unlearned
 from ahv_control.newton_raphson import Solution, SolverStatus
 from ahv_control.parameters import INNER_LOOP_PARAMETERS, inner_loop
-from ahv_msgs_py.base_node import OK, WARN, BaseNode, run
+from ahv_msgs_py.base_node import BaseNode
+from ahv_msgs_py.faults import HOLD, PERIOD, Fault
+from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,
     RATE_COMMAND,
-    STATE,
     SURFACE_COMMAND,
 )
+from ahv_plant.parameters import DEFAULT_START
 from ahv_plant.state import State
+
+FAULTS = {
+    SolverStatus.SATURATED: Fault.SURFACES_SATURATED,
+    SolverStatus.ITERATION_LIMIT: Fault.NEWTON_LIMIT,
+    SolverStatus.SINGULAR: Fault.NEWTON_SINGULAR,
+}
+
+
+def held_rates(last: Values | None, age: int) -> Values:
+    """Rate command [rad/s] while none comes: the last one for a while, then zero rates."""
+    if last is not None and age * PERIOD <= HOLD:
+        return last
+    return 0.0, 0.0, 0.0
+
+
+def no_observer(last: Values | None, age: int) -> None:
+    """Stand in for a learner that is gone: an old observer would be worse than none."""
+
+
+def held_estimate(last: Values | None, age: int) -> Values:
+    """Disturbance estimate while none comes: the last one; what the vehicle lacks, it lacks."""
+    return last or (0.0,) * 6
 
 
 class InnerLoopNode(BaseNode):
@@ -32,14 +56,36 @@ class InnerLoopNode(BaseNode):
     ):
         """`values` overrides parameters."""
         super().__init__("inner_loop", INNER_LOOP_PARAMETERS, values, context)
-        self._loop = inner_loop(self.settings)
-        self._previous = NEUTRAL
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Make the loop."""
+        self._loop = inner_loop(settings)
+        still = Rates(0.0, 0.0, 0.0)  # compiled before it flies
+        if settings["adaptive"]:
+            learned = Learned(still, still, still)
+            adaptive_surfaces(DEFAULT_START, still, learned, NEUTRAL, self._loop)
+        else:
+            nominal_surfaces(DEFAULT_START, still, NEUTRAL, self._loop)
+
+    def start(self) -> None:
+        """Open the topics; the first search starts at neutral surfaces."""
+        self.new_flight()
         self._send = self.sender(SURFACE_COMMAND)
         if self.settings["adaptive"]:
-            topics = (STATE, RATE_COMMAND, LEARNER, DISTURBANCE_ESTIMATE)
-            self.receive_together(topics, self._answer_adaptive)
+            self.receive_together(
+                self._answer_adaptive,
+                {
+                    RATE_COMMAND: held_rates,
+                    LEARNER: no_observer,
+                    DISTURBANCE_ESTIMATE: held_estimate,
+                },
+            )
         else:
-            self.receive_together((STATE, RATE_COMMAND), self._answer_nominal)
+            self.receive_together(self._answer_nominal, {RATE_COMMAND: held_rates})
+
+    def new_flight(self) -> None:
+        """Forget the surfaces of the flight before."""
+        self._previous = NEUTRAL
 
     def _answer_nominal(self, stamp: int, state: Values, command: Values) -> None:
         self._answer(
@@ -48,19 +94,19 @@ class InnerLoopNode(BaseNode):
         )
 
     def _answer_adaptive(
-        self, stamp: int, state: Values, command: Values, learner: Values, estimate: Values
+        self, stamp: int, state: Values, command: Values, learner: Values | None, estimate: Values
     ) -> None:
-        learned = learned_of(learner, estimate)
+        now = State(*state)
+        learned = unlearned(now, estimate) if learner is None else learned_of(learner, estimate)
         self._answer(
-            stamp,
-            adaptive_surfaces(State(*state), Rates(*command), learned, self._previous, self._loop),
+            stamp, adaptive_surfaces(now, Rates(*command), learned, self._previous, self._loop)
         )
 
     def _answer(self, stamp: int, solution: Solution) -> None:
         self._previous = solution.surfaces
         self._send(stamp, solution.surfaces)
-        level = OK if solution.status == SolverStatus.CONVERGED else WARN
-        self.report(stamp, level, SolverStatus(solution.status).name.lower().replace("_", " "))
+        if solution.status != SolverStatus.CONVERGED:
+            self.fault(stamp, FAULTS[SolverStatus(solution.status)], "Newton-Raphson")
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from ahv_control.disturbance_learner import LearnerState
 from ahv_control.inner_loop import Learned
 from ahv_control.intermediate_loop import Rates
+from ahv_plant.state import State
 
 
 def learner_values(learner: LearnerState) -> tuple[float, ...]:
@@ -20,3 +21,12 @@ def estimate_values(estimate: Rates) -> tuple[float, ...]:
 def learned_of(learner: Sequence[float], estimate: Sequence[float]) -> Learned:
     """What the inner loop takes from the two messages."""
     return Learned(Rates(*learner[0:3]), Rates(*learner[3:6]), Rates(*estimate[3:6]))
+
+
+def unlearned(state: State, estimate: Sequence[float]) -> Learned:
+    """What the inner loop takes while the learner is gone: the estimate alone.
+
+    With both observers at the state, eqs 4.4-4.5 are the nominal law less d-hat.
+    """
+    rates = Rates(state.P, state.Q, state.R)
+    return Learned(rates, rates, Rates(*estimate[3:6]))

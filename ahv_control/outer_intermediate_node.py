@@ -9,10 +9,12 @@ from ahv_control.parameters import (
     intermediate_loop,
     outer_loop,
 )
-from ahv_msgs_py.base_node import OK, BaseNode, run
+from ahv_msgs_py.base_node import BaseNode
+from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.stepwise import Values
-from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND, STATE
+from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND
+from ahv_plant.parameters import DEFAULT_START
 from ahv_plant.state import State
 
 
@@ -24,18 +26,25 @@ class OuterIntermediateNode(BaseNode):
     ):
         """`values` overrides parameters."""
         super().__init__("outer_intermediate", OUTER_INTERMEDIATE_PARAMETERS, values, context)
-        self._outer = outer_loop(self.settings)
-        self._intermediate = intermediate_loop(self.settings)
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Make both loops."""
+        self._outer = outer_loop(settings)
+        self._intermediate = intermediate_loop(settings)
+        attitude = attitude_command(DEFAULT_START, self._outer)  # compiled before it flies
+        rate_command(DEFAULT_START, attitude, self._intermediate)
+
+    def start(self) -> None:
+        """Open the topics."""
         self._send_attitude = self.sender(ATTITUDE_COMMAND)
         self._send_rates = self.sender(RATE_COMMAND)
-        self.receive(STATE, self._answer)
+        self.receive_together(self._answer, {})
 
     def _answer(self, stamp: int, values: Values) -> None:
         state = State(*values)
         attitude = attitude_command(state, self._outer)
         self._send_rates(stamp, rate_command(state, attitude, self._intermediate))
         self._send_attitude(stamp, attitude)
-        self.report(stamp, OK, "answering")
 
 
 def main() -> None:

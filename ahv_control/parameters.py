@@ -15,12 +15,12 @@ from ahv_plant.parameters import GEOMETRIC_ALTITUDE
 FASTEST = 50.0  # [1/s] gains above half the control rate cannot be meant
 
 
-def _gain(name: str, default: float, description: str) -> Parameter:
-    return Parameter(name, default, description, "1/s", 0.0, FASTEST)
+def _gain(name: str, default: float, description: str, in_flight: bool = True) -> Parameter:
+    return Parameter(name, default, description, "1/s", 0.0, FASTEST, in_flight)
 
 
 OUTER_INTERMEDIATE_PARAMETERS = (
-    Parameter("altitude", 24000.0, "altitude command h*", "m", 0.0, 48000.0),
+    Parameter("altitude", 24000.0, "altitude command h*", "m", 0.0, 48000.0, in_flight=True),
     _gain("k_h", 0.01, "altitude gain, eq 3.1"),
     _gain("k_phi", 0.2, "roll-angle gain, section 3.2"),
     _gain("k_theta", 0.2, "pitch-angle gain, section 3.2"),
@@ -32,6 +32,7 @@ OUTER_INTERMEDIATE_PARAMETERS = (
         "deg",
         0.1,
         180.0,
+        in_flight=True,
     ),
 )
 
@@ -42,17 +43,22 @@ def _bound(name: str) -> Parameter:
     )
 
 
+def _shared_gain(name: str, default: float, description: str) -> Parameter:
+    # two nodes have it and must agree at every step, so it cannot be changed in flight
+    return _gain(name, default, description, in_flight=False)
+
+
 _TRACKING = (
-    _gain("k_P", 2.0, "roll-rate gain, section 3.3"),
-    _gain("k_Q", 2.0, "pitch-rate gain, section 3.3"),
-    _gain("k_R", 2.0, "yaw-rate gain, section 3.3"),
+    _shared_gain("k_P", 2.0, "roll-rate gain, section 3.3"),
+    _shared_gain("k_Q", 2.0, "pitch-rate gain, section 3.3"),
+    _shared_gain("k_R", 2.0, "yaw-rate gain, section 3.3"),
     *(_bound(f"k_s_{rate}") for rate in "PQR"),
     Parameter("lambda", 1.0, "exponent of eq 5.8: 1 is plain dynamic inversion", "", 0.0, 3.0),
 )
 _OBSERVER = (
-    _gain("k_ap_P", 15.0, "observer gain of the roll channel, eq 4.3"),
-    _gain("k_ap_Q", 18.0, "observer gain of the pitch channel, eq 4.3"),
-    _gain("k_ap_R", 15.0, "observer gain of the yaw channel, eq 4.3"),
+    _shared_gain("k_ap_P", 15.0, "observer gain of the roll channel, eq 4.3"),
+    _shared_gain("k_ap_Q", 18.0, "observer gain of the pitch channel, eq 4.3"),
+    _shared_gain("k_ap_R", 15.0, "observer gain of the yaw channel, eq 4.3"),
 )
 INNER_LOOP_PARAMETERS = (
     Parameter("adaptive", False, "follow the disturbance learner (chapters 4 and 5)"),
@@ -72,7 +78,7 @@ LEARNER_PARAMETERS = (
     GEOMETRIC_ALTITUDE,
 )
 VELOCITY_PARAMETERS = (
-    Parameter("speed", 1786.4, "forward-speed command u*", "m/s", 0.0, 8000.0),
+    Parameter("speed", 1786.4, "forward-speed command u*", "m/s", 0.0, 8000.0, in_flight=True),
     _gain("k_u", 0.01, "speed gain, eq 3.2"),
     GEOMETRIC_ALTITUDE,
 )

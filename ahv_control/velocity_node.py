@@ -2,14 +2,23 @@
 
 import rclpy
 
+from ahv_control.flight_control import NEUTRAL
 from ahv_control.parameters import VELOCITY_PARAMETERS, velocity_loop
 from ahv_control.velocity_loop import throttle_command
-from ahv_msgs_py.base_node import OK, WARN, BaseNode, run
+from ahv_msgs_py.base_node import BaseNode
+from ahv_msgs_py.faults import Fault
+from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.stepwise import Values
-from ahv_msgs_py.topics import STATE, SURFACE_COMMAND, THROTTLE_COMMAND
+from ahv_msgs_py.topics import SURFACE_COMMAND, THROTTLE_COMMAND
 from ahv_plant.constants import THROTTLE_MAXIMUM, THROTTLE_MINIMUM
+from ahv_plant.parameters import DEFAULT_START
 from ahv_plant.state import State, Surfaces
+
+
+def held_surfaces(last: Values | None, age: int) -> Values:
+    """Surfaces [rad] to reckon with while none are commanded: the plant holds them as well."""
+    return last or NEUTRAL
 
 
 class VelocityNode(BaseNode):
@@ -20,15 +29,22 @@ class VelocityNode(BaseNode):
     ):
         """`values` overrides parameters."""
         super().__init__("velocity", VELOCITY_PARAMETERS, values, context)
-        self._loop = velocity_loop(self.settings)
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Make the loop."""
+        self._loop = velocity_loop(settings)
+        throttle_command(DEFAULT_START, NEUTRAL, self._loop)  # compiled before it flies
+
+    def start(self) -> None:
+        """Open the topics."""
         self._send = self.sender(THROTTLE_COMMAND)
-        self.receive_together((STATE, SURFACE_COMMAND), self._answer)
+        self.receive_together(self._answer, {SURFACE_COMMAND: held_surfaces})
 
     def _answer(self, stamp: int, state: Values, surfaces: Values) -> None:
         throttle = throttle_command(State(*state), Surfaces(*surfaces), self._loop)
         self._send(stamp, (throttle,))
-        free = THROTTLE_MINIMUM < throttle < THROTTLE_MAXIMUM
-        self.report(stamp, OK if free else WARN, "tracking" if free else "throttle at its stop")
+        if not THROTTLE_MINIMUM < throttle < THROTTLE_MAXIMUM:
+            self.fault(stamp, Fault.THROTTLE_SATURATED, f"throttle is {throttle:g}")
 
 
 def main() -> None:

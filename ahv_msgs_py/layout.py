@@ -67,7 +67,9 @@ class Layout:
 
     def values_of(self, message: Any) -> tuple[int, tuple[float, ...]]:
         """Stamp [ns] and values of a message object of this type; MessageError if unfit."""
-        stamp = message.header.stamp
+        stamp, frame = message.header.stamp, message.header.frame_id
+        if frame not in ("", self.frame):
+            raise MessageError(f"frame_id is {frame!r}, but must be {self.frame!r}")
         return stamp.sec * NANOSECONDS + stamp.nanosec, self._read(message)
 
     def _read(self, message: Any) -> tuple[float, ...]:
@@ -91,6 +93,8 @@ class NamedVector(Layout):
                 f"names {list(message.name)} with {len(message.position)} positions, "
                 f"but must be {list(self.fields)}, one position each"
             )
+        if len(message.velocity) or len(message.effort):
+            raise MessageError("velocity and effort are not empty, but nothing is known of them")
         return tuple(message.position)
 
 

@@ -27,6 +27,7 @@ class Parameter(NamedTuple):
     unit: str = ""
     minimum: float | None = None
     maximum: float | None = None
+    in_flight: bool = False  # may be changed while the vehicle flies
 
     @property
     def valid(self) -> str:

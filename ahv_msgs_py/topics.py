@@ -7,6 +7,7 @@ local gives a node that joins late what it missed: no order of starting loses a 
 recorder that is late or slow gets everything.
 """
 
+from sys import float_info
 from typing import NamedTuple
 
 from ahv_msgs_py.layout import Layout, NamedVector, StampedAcceleration, StampedVector
@@ -31,6 +32,7 @@ class LoopTopic(NamedTuple):
     name: str
     layout: Layout
     units: str
+    bounds: tuple[tuple[float, float], ...]  # of every field: beyond, a value cannot be meant
     description: str
 
 
@@ -44,34 +46,46 @@ class ViewerTopic(NamedTuple):
     durable: bool = True  # transient local; ROS's own parameter events are not
 
 
+# Bounds: beyond them a value cannot be meant. What has no bound of its own must be finite.
+_FINITE = (-float_info.max, float_info.max)
+_DEFLECTION = (-0.7, 0.55)  # [rad] a little beyond the stops
+_THROTTLE = (0.0, 1.0)  # [-]
+_MASS = (1.0, 1e7)  # [kg]
+
+
 STATE = LoopTopic(
     "/ahv/state",
     NamedVector(BODY_FRAME, STATE_NAMES),
     "m/s, m/s, m/s, rad/s, rad/s, rad/s, rad, rad, rad, m, m, m, kg",
+    (_FINITE,) * 12 + (_MASS,),
     "vehicle state at 100 Hz",
 )
 ATTITUDE_COMMAND = LoopTopic(
     "/ahv/attitude_command",
     StampedVector(EARTH_FRAME, ("phi", "theta", "psi")),
     "rad",
+    (_FINITE,) * 3,
     "attitude command phi*, theta*, psi* of the outer loop",
 )
 RATE_COMMAND = LoopTopic(
     "/ahv/rate_command",
     StampedVector(BODY_FRAME, ("P", "Q", "R")),
     "rad/s",
+    (_FINITE,) * 3,
     "body-rate command P*, Q*, R* of the intermediate loop",
 )
 SURFACE_COMMAND = LoopTopic(
     "/ahv/surface_command",
     NamedVector(BODY_FRAME, SURFACE_NAMES),
     "rad",
+    (_DEFLECTION,) * 3,
     "deflections delta_e, delta_a, delta_r of the inner loop",
 )
 THROTTLE_COMMAND = LoopTopic(
     "/ahv/throttle_command",
     NamedVector(BODY_FRAME, ("throttle",)),
     "1",
+    (_THROTTLE,),
     "throttle sigma_T of the velocity loop",
 )
 NOMINAL_TOPICS = (STATE, ATTITUDE_COMMAND, RATE_COMMAND, SURFACE_COMMAND, THROTTLE_COMMAND)
@@ -80,12 +94,14 @@ DISTURBANCE_ESTIMATE = LoopTopic(
     "/ahv/disturbance_estimate",
     StampedAcceleration(BODY_FRAME, ("x", "y", "z", "P", "Q", "R")),
     "m/s^2 (zero), rad/s^2",
+    (_FINITE,) * 6,
     "learned disturbance d-hat of the rates of P, Q, R, as angular acceleration",
 )
 LEARNER = LoopTopic(
     "/ahv/learner",
     NamedVector(BODY_FRAME, LEARNER_NAMES),
     "rad/s for X_a and X_d; weights in deg/s^2 by the units of the basis in deg/s",
+    (_FINITE,) * len(LEARNER_NAMES),
     "state of the disturbance learner: approximate plant, desired plant, weights",
 )
 LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)
@@ -103,7 +119,7 @@ DIAGNOSTICS = ViewerTopic(
     "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
     4,
-    "health of the nodes, on every change",
+    "health of the nodes, at 1 Hz and on every change",
 )
 LOG = ViewerTopic("/rosout", "rcl_interfaces/msg/Log", None, "log of all nodes")
 PARAMETER_EVENTS = ViewerTopic(

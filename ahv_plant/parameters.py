@@ -56,6 +56,17 @@ DISTURBANCE_PARAMETERS = tuple(
 PLANT_PARAMETERS = FLIGHT_PARAMETERS + DISPERSION_PARAMETERS + DISTURBANCE_PARAMETERS
 
 
+# Section 3.5.2: where flights start, and what a law is tried out on before it flies.
+DEFAULT_START = State(
+    **{
+        name: float(parameter.default) * (RADIANS if parameter.unit.startswith("deg") else 1.0)
+        for parameter in FLIGHT_PARAMETERS
+        for prefix, _, name in [parameter.name.partition(".")]
+        if prefix == "initial"
+    }
+)
+
+
 class PlantSettings(NamedTuple):
     """What the plant flies: in SI units."""
 

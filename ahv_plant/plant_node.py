@@ -1,5 +1,7 @@
-"""Node `plant`: the vehicle in lockstep with its flight control."""
+"""Node `plant`: the vehicle, in lockstep with its flight control or by the wall clock."""
 
+import time
+from array import array
 from functools import partial
 from typing import Any
 
@@ -9,8 +11,11 @@ from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from scipy.spatial.transform import Rotation
 
-from ahv_msgs_py.base_node import ERROR, OK, QOS, BaseNode, message_class, run
+from ahv_msgs_py.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.faults import HOLD, Fault
+from ahv_msgs_py.health import ERROR, MILLISECONDS, OK, percentile
 from ahv_msgs_py.layout import NANOSECONDS, clock_bytes
+from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.stepwise import Stepwise, Values
 from ahv_msgs_py.topics import (
@@ -22,10 +27,12 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
     TRANSFORM,
+    LoopTopic,
 )
 from ahv_plant.constants import STEP, STEP_NS
 from ahv_plant.departure import departure_reason
 from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
+from ahv_plant.safe_command import SAFE_THROTTLE, safe_surfaces
 from ahv_plant.state import State, Surfaces
 from ahv_plant.vehicle import vehicle_step
 
@@ -33,10 +40,22 @@ LONGEST_WAIT = Duration(seconds=5.0)  # for a listener that has stopped, per top
 VIEWER_PERIOD = 10  # steps between messages for viewers: 10 Hz
 
 
-class PlantNode(BaseNode):
-    """Publishes state k at stamp k * 10 ms; integrates to k + 1 when both its commands are there.
+class Held:
+    """The newest valid command of a topic, in real time."""
 
-    `finished` holds the reason why the flight ended, which is empty when it was flown to its end.
+    def __init__(self, topic: LoopTopic, values: Values):
+        """`values` stand in until the first command comes."""
+        self.topic = topic
+        self.stamp = -STEP_NS  # [ns] of the state that it answers
+        self.values = values
+
+
+class PlantNode(BaseNode):
+    """Publishes state k at stamp k * 10 ms and integrates to k + 1.
+
+    In lockstep when both commands of k are there; in real time when the 10 ms are over, with the
+    newest valid commands. `finished` holds the reason why the flight ended, which is empty when it
+    was flown to its end.
     """
 
     def __init__(
@@ -44,55 +63,137 @@ class PlantNode(BaseNode):
     ):
         """`values` overrides parameters."""
         super().__init__("plant", PLANT_PARAMETERS, values, context)
-        self.flight = plant_settings(self.settings)
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Set up the vehicle and its flight."""
+        self.flight = plant_settings(settings)
         self.step = 0
         self.state = self.flight.initial
-        self._started = False
-        topics = (SURFACE_COMMAND, THROTTLE_COMMAND)
-        self._inputs = Stepwise([topic.name for topic in topics], self._advance)
-        for topic in topics:
-            self.receive(topic, partial(self._take, topic.name))
-        self._clock = self.create_publisher(message_class(CLOCK.type_name), CLOCK.name, QOS)
-        self._odometry = self.create_publisher(Odometry, ODOMETRY.name, QOS)
+        truth = self.flight.truth  # compiled before it flies
+        vehicle_step(self.state, Surfaces(0.0, 0.0, 0.0), SAFE_THROTTLE, 0.0, truth)
+        departure_reason(self.state, truth.geometric, 0.0)
+
+    def start(self) -> None:
+        """Open the topics; the flight starts, or goes on, when as many listen as should."""
+        self._flying = False
+        self._listened = 0
+        self._surfaces = Held(SURFACE_COMMAND, (0.0, 0.0, 0.0))
+        self._throttle = Held(THROTTLE_COMMAND, (SAFE_THROTTLE,))
+        self._latencies = array("q")  # [ns] from a state to both its commands
+        self._published = 0  # [ns] when the newest state was
+        if self.realtime:
+            for held in (self._surfaces, self._throttle):
+                self.receive(held.topic, partial(self._hold, held))
+        else:
+            topics = (SURFACE_COMMAND, THROTTLE_COMMAND)
+            steps = Stepwise([topic.name for topic in topics], self._answered)
+            for topic in topics:
+                self.receive(topic, partial(self._take, steps, topic.name))
+        viewers = quality(durable=True)
+        self._send_clock = self.publisher(CLOCK.type_name, CLOCK.name, viewers)
+        self._odometry = self.publisher(ODOMETRY.type_name, ODOMETRY.name, viewers)
         self._transform = self._transform_publisher()
         self._send_state = self.sender(STATE, self._listeners_changed)
 
     def _transform_publisher(self) -> Any:
         """Return a publisher of /tf, or None: tf2_msgs is part of ROS 2, but not on PyPI."""
         try:
-            return self.create_publisher(message_class(TRANSFORM.type_name), TRANSFORM.name, QOS)
+            return self.publisher(TRANSFORM.type_name, TRANSFORM.name, quality(durable=True))
         except ModuleNotFoundError:
             return None
 
     def _listeners_changed(self, matched: Any) -> None:
-        """Start the flight when as many listen as should."""
-        if not self._started and matched.current_count >= self.settings["listeners"]:
-            self._started = True
-            self.report(0, OK, "flying", steps=self.flight.steps)
+        """Start the flight when as many listen as should; say so when some have gone."""
+        wanted = int(self.settings["listeners"])
+        if not self._flying and matched.current_count >= wanted:
+            self._flying = True
+            self.announce(self.step * STEP_NS, OK, "flying", steps=self.flight.steps)
+            if self.realtime:
+                timer = self.create_timer(STEP, self._tick)
+                self._opened.append(partial(self.destroy_timer, timer))
+                self._ticked = time.monotonic_ns()
             self._publish()
+        elif matched.current_count < min(wanted, self._listened) and not self.finished.done():
+            self.fault(
+                self.step * STEP_NS,
+                Fault.LISTENER_LOST,
+                f"{matched.current_count} of {wanted} subscribers of the state are left",
+            )
+        self._listened = matched.current_count
 
     def _publish(self) -> None:
         stamp = self.step * STEP_NS
-        self._clock.publish(clock_bytes(stamp))
+        self.now = stamp
+        self._send_clock.publish(clock_bytes(stamp))
         if self.step % VIEWER_PERIOD == 0:
             self._publish_for_viewers(stamp)
+        if not self.realtime and stamp % NANOSECONDS == 0 and stamp:
+            self.report_health(stamp)
+        if self.realtime:
+            self._published = time.monotonic_ns()
+        self.health.state_came()
         self._send_state(stamp, self.state)
 
-    def _take(self, name: str, stamp: int, values: Values) -> None:
+    # Lockstep
+
+    def _take(self, steps: Stepwise, name: str, stamp: int, values: Values) -> None:
         """Take a command, unless it answers a state that was never sent: one of another flight."""
         if self.finished.done():
             return
-        if self._started and stamp <= self.step * STEP_NS:
-            self._inputs.put(name, stamp, values)
+        if self._flying and stamp <= self.step * STEP_NS:
+            steps.put(name, stamp, values)
         else:
             self._finish(
                 0, ERROR, f"{name} has commands of another flight: restart the controllers"
             )
 
-    def _advance(self, stamp: int, surfaces: Values, throttle: Values) -> None:
-        """Integrate one step, or end the flight."""
-        if stamp != self.step * STEP_NS or self.finished.done():
+    def _answered(self, stamp: int, surfaces: Values, throttle: Values) -> None:
+        """Integrate one step with the commands that answer the newest state."""
+        if stamp == self.step * STEP_NS and not self.finished.done():
+            self.health.answered()
+            self._advance(surfaces, throttle)
+
+    # Real time
+
+    def _hold(self, held: Held, stamp: int, values: Values) -> None:
+        """Keep a valid command; time the step if it is its last."""
+        held.stamp, held.values = stamp, values
+        if stamp == self.now and self._surfaces.stamp == self._throttle.stamp:
+            self._latencies.append(time.monotonic_ns() - self._published)
+            self.health.answered()
+
+    def _tick(self) -> None:
+        """Integrate one step with the commands that are held, however old they are."""
+        if self.finished.done():
             return
+        now = time.monotonic_ns()
+        lost = (now - self._ticked) // STEP_NS - 1
+        if lost > 0:
+            self.fault(self.step * STEP_NS, Fault.TICK_MISSED, f"{lost} in a row", lost)
+        self._ticked = now
+        surfaces = self._command(self._surfaces)
+        if surfaces is None:
+            surfaces = safe_surfaces(Surfaces(*self._surfaces.values))
+        throttle = self._command(self._throttle) or self._throttle.values
+        self._advance(surfaces, throttle)
+
+    def _command(self, held: Held) -> Values | None:
+        """Return the held command, or None if it has been held for too long."""
+        stamp = self.step * STEP_NS
+        age = stamp - held.stamp
+        if age == 0:
+            return held.values
+        self.fault(stamp, Fault.LATE, f"{held.topic.name}: the last one is {age * 1e-9:g} s old")
+        if age <= HOLD:
+            return held.values
+        self.fault(stamp, Fault.COMMAND_LOST, f"{held.topic.name}: none for {age * 1e-9:g} s")
+        return None
+
+    # Both
+
+    def _advance(self, surfaces: Values, throttle: Values) -> None:
+        """Integrate one step, or end the flight."""
+        stamp = self.step * STEP_NS
         if self.step == self.flight.steps:
             self._finish(stamp, OK, "")
             return
@@ -109,7 +210,14 @@ class PlantNode(BaseNode):
         self._publish()
 
     def _finish(self, stamp: int, level: bytes, reason: str) -> None:
-        self.report(stamp, level, reason or "flown to the end", steps=self.step, over=True)
+        facts: dict[str, object] = {"steps": self.step, "over": True}
+        facts |= {fault.name.lower(): count for fault, count in self.health.total.items()}
+        if self.realtime and self._latencies:
+            ordered = array("q", sorted(self._latencies))
+            for name, share in (("p50", 0.5), ("p99", 0.99), ("max", 1.0)):
+                facts[f"latency_ms_{name}"] = f"{percentile(ordered, share) * MILLISECONDS:.3f}"
+        self.results = facts
+        self.announce(stamp, level, reason or "flown to the end", **facts)
         self.get_logger().info(
             f"flight over after {self.step} steps: {reason or 'flown to its end'}"
         )

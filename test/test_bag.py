@@ -43,7 +43,7 @@ def test_messages_of_another_sender_are_read(tmp_path):
     for topic in LOOP_TOPICS:
         values = tuple(float(number) for number in range(len(topic.layout.fields)))
         message = message_of(topic, 70_000_000, values)
-        message.header.frame_id = "elsewhere"
+        message.header.frame_id = ""
         bag.write(topic.name, serialize_message(message))
     bag.close()
     flown = read_bag(tmp_path / "bag")

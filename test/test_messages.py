@@ -102,13 +102,21 @@ def test_clock_bytes_are_those_of_rosbags():
 
 
 @TOPICS
-def test_a_message_of_another_frame_is_read_the_general_way(topic):
+def test_a_message_without_a_frame_is_read_the_general_way(topic):
     values = tuple(float(number) for number in range(len(topic.layout.fields)))
     message = message_of(topic, 20_000_000, values)
-    message.header.frame_id = "another_frame"
+    message.header.frame_id = ""
     data = serialize_message(message)
     assert topic.layout.decode(data) is None
     assert topic.layout.values_of(message) == (20_000_000, values)
+
+
+@TOPICS
+def test_a_message_of_another_frame_is_refused(topic):
+    message = message_of(topic, 20_000_000, (0.0,) * len(topic.layout.fields))
+    message.header.frame_id = "base_link_flu"
+    with pytest.raises(MessageError, match="base_link_flu"):
+        topic.layout.values_of(message)
 
 
 @pytest.mark.parametrize(
