@@ -3,6 +3,7 @@
 import json
 import sys
 import time
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -100,6 +101,9 @@ def fly(
     realtime: Annotated[
         bool, typer.Option("--realtime", help="100 Hz by the wall clock, not lockstep.")
     ] = False,
+    processes: Annotated[
+        bool, typer.Option("--processes", help="One process per node, not all nodes in one.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for the bag and the summary, which must not have them."),
@@ -136,9 +140,8 @@ def fly(
     with progress_bar(f"flying {flight.name}", flight.plant.steps, as_json) as progress:
         if engine == Engine.graph:
             check_domain()
-            from ahv_analysis.graph_flight import fly_graph
-
-            ended_early, wall = fly_graph(flight, bag, realtime=realtime, progress=progress)
+            fly_ros = _engine(processes)
+            ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
         else:
             ended_early, wall = fly_library(flight, bag, progress=progress)
     record = read_bag(bag)
@@ -153,6 +156,14 @@ def fly(
         _print_summary(summary)
     if ended_early:
         raise typer.Exit(1)
+
+
+def _engine(processes: bool) -> Callable[..., tuple[str, float]]:
+    """Return what flies a case on the graph; only this needs ROS."""
+    from ahv_analysis.graph_flight import fly_graph
+    from ahv_analysis.process_flight import fly_processes
+
+    return fly_processes if processes else fly_graph
 
 
 def _dispersion(choice: str | None, seed: int, run: int) -> dict[str, object]:

@@ -11,28 +11,14 @@ from rclpy.experimental import EventsExecutor
 from ahv_analysis.case import Case, notes
 from ahv_analysis.errors import GraphError
 from ahv_analysis.flight import fly
+from ahv_analysis.process_flight import controllers, node_class
 from ahv_analysis.recorder_node import RecorderNode
-from ahv_control.disturbance_learner_node import DisturbanceLearnerNode
-from ahv_control.inner_loop_node import InnerLoopNode
-from ahv_control.outer_intermediate_node import OuterIntermediateNode
-from ahv_control.velocity_node import VelocityNode
 from ahv_msgs_py.base_node import REALTIME, BaseNode
 from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
-CONTROLLERS = {
-    "outer_intermediate": OuterIntermediateNode,
-    "disturbance_learner": DisturbanceLearnerNode,
-    "inner_loop": InnerLoopNode,
-    "velocity": VelocityNode,
-}
 LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
 LOOK = 0.2  # [s] between looks at the progress
-
-
-def controllers(case: Case) -> list[str]:
-    """Names of the controller nodes that a case needs."""
-    return [name for name in CONTROLLERS if name != "disturbance_learner" or case.control.learner]
 
 
 def loop_topics(case: Case) -> Sequence[LoopTopic]:
@@ -67,7 +53,7 @@ def fly_graph(
             recorder = RecorderNode({"bag": str(bag), "notes": notes(case)} | mode, context)
             nodes.append(recorder)
         nodes += [
-            CONTROLLERS[name](case.parameters[name] | mode, context) for name in controllers(case)
+            node_class(name)(case.parameters[name] | mode, context) for name in controllers(case)
         ]
         listeners = len(nodes)
         plant = PlantNode(case.parameters["plant"] | mode | {"listeners": listeners}, context)

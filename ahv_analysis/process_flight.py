@@ -1,0 +1,218 @@
+"""A flight on the ROS graph, one process per node."""
+
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from types import TracebackType
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.experimental import EventsExecutor
+
+from ahv_analysis.case import Case, notes
+from ahv_analysis.errors import GraphError
+from ahv_msgs_py.base_node import REALTIME, BaseNode, quality
+from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.node_process import run
+from ahv_msgs_py.parameters import Value
+from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
+from ahv_plant.constants import STEP_NS
+
+NODES = {
+    "recorder": "ahv_analysis.recorder_node.RecorderNode",
+    "outer_intermediate": "ahv_control.outer_intermediate_node.OuterIntermediateNode",
+    "disturbance_learner": "ahv_control.disturbance_learner_node.DisturbanceLearnerNode",
+    "inner_loop": "ahv_control.inner_loop_node.InnerLoopNode",
+    "velocity": "ahv_control.velocity_node.VelocityNode",
+    "plant": "ahv_plant.plant_node.PlantNode",
+}
+LONGEST_START = 30.0  # [s] until the first state
+LONGEST_SILENCE = 10.0  # [s] without a sign of the plant, after which the graph has failed
+LONGEST_END = 10.0  # [s] for a process to end by itself
+LOOK = 0.05  # [s] between looks at the processes
+
+
+def controllers(case: Case) -> list[str]:
+    """Names of the controller nodes that a case needs."""
+    names = ["outer_intermediate", "disturbance_learner", "inner_loop", "velocity"]
+    return [name for name in names if name != "disturbance_learner" or case.control.learner]
+
+
+def node_class(name: str) -> Callable[..., BaseNode]:
+    """Class of a node by its name in the graph."""
+    module, _, attribute = NODES[name].rpartition(".")
+    found: Callable[..., BaseNode] = getattr(import_module(module), attribute)
+    return found
+
+
+def _run_node(name: str, values: dict[str, Value]) -> None:
+    """Be the process of a node."""
+    sys.argv = [name]
+    run(lambda: node_class(name)(values))
+
+
+class ProcessGraph:
+    """The processes of a graph: started in order, watched, ended; leaves none behind.
+
+    They are forked off a server that has loaded everything, so that a node starts in a tenth of
+    the time that a fresh interpreter takes.
+    """
+
+    def __init__(self, case: Case, bag: Path | None, realtime: bool):
+        """Prepare the nodes of `case`; nothing runs yet."""
+        mode: dict[str, Value] = {REALTIME.name: realtime}
+        self.values = {name: case.parameters[name] | mode for name in controllers(case)}
+        self.controllers = list(self.values)
+        if bag is not None:
+            self.values |= {"recorder": {"bag": str(bag), "notes": notes(case)} | mode}
+        self.values["plant"] = case.parameters["plant"] | mode | {"listeners": len(self.values)}
+        self.processes: dict[str, BaseProcess] = {}
+        self._context = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(
+            [path.rpartition(".")[0] for path in NODES.values()] + ["ahv_analysis.node_server"]
+        )
+
+    def __enter__(self) -> "ProcessGraph":
+        for name in sorted(self.values, key=list(NODES).index):
+            self.start(name)
+        return self
+
+    def start(self, name: str) -> None:
+        """Start the process of a node."""
+        process = self._context.Process(
+            target=_run_node, args=(name, self.values[name]), name=name, daemon=True
+        )
+        process.start()
+        self.processes[name] = process
+
+    def signal(self, name: str, number: int) -> None:
+        """Send a signal to the process of a node."""
+        pid = self.processes[name].pid
+        assert pid is not None
+        os.kill(pid, number)
+
+    def kill(self, name: str) -> None:
+        """End the process of a node as a crash would, and wait until it has gone."""
+        self.processes[name].kill()
+        self.processes[name].join()
+
+    def ended(self) -> dict[str, int]:
+        """Exit codes of the processes that have ended, by node."""
+        codes = {name: process.exitcode for name, process in self.processes.items()}
+        return {name: code for name, code in codes.items() if code is not None}
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Let plant and recorder finish, interrupt the others, kill what does not hear."""
+        if error is None:
+            for name in ("plant", "recorder"):  # end by themselves when all is said
+                if name in self.processes:
+                    self.processes[name].join(LONGEST_END)
+        for name, process in self.processes.items():
+            if process.exitcode is None:
+                self.signal(name, signal.SIGCONT)
+                self.signal(name, signal.SIGINT)
+        deadline = time.monotonic() + LONGEST_END
+        for process in self.processes.values():
+            process.join(max(0.1, deadline - time.monotonic()))
+            if process.exitcode is None:
+                process.kill()
+                process.join()
+
+
+class Watcher:
+    """Listens to the diagnostics of the graph from outside it."""
+
+    def __init__(self) -> None:
+        """Start to listen; no flight has been seen yet."""
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self._node = rclpy.create_node("watcher", namespace=NAMESPACE, context=self.context)
+        self._executor = EventsExecutor(context=self.context)
+        self._executor.add_node(self._node)
+        self._node.create_subscription(
+            DiagnosticArray, DIAGNOSTICS.name, self._take, quality(durable=True)
+        )
+        self.step = -1  # of the newest report of the plant
+        self.over: dict[str, str] | None = None  # what the plant said at the end
+        self.reason = ""  # why it ended early
+        self.statuses: list[tuple[int, str, int, str, dict[str, str]]] = []
+
+    def _take(self, message: DiagnosticArray) -> None:
+        stamp = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
+        for status in message.status:
+            facts = {fact.key: fact.value for fact in status.values}
+            name = status.name.rpartition("/")[2]
+            self.statuses.append((stamp, name, status.level[0], status.message, facts))
+            if name == "plant":
+                self.step = stamp // STEP_NS
+                if "over" in facts:
+                    self.over = facts
+                    self.reason = "" if status.level == b"\x00" else status.message
+
+    def look(self, seconds: float) -> None:
+        """Listen for so long."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            self._executor.spin_once(left)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._executor.remove_node(self._node)
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+def fly_processes(
+    case: Case,
+    bag: Path | None,
+    *,
+    realtime: bool = False,
+    progress: Callable[[int], None] = lambda steps: None,
+) -> tuple[str, float]:
+    """Fly `case` with one process per node, as `fly_graph` does in this one.
+
+    In real time a controller that ends is started again at once. Returns why the flight ended
+    early (empty if it did not) and the seconds that it took. Raises GraphError if the graph stops.
+    """
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    watcher = Watcher()
+    try:
+        with ProcessGraph(case, bag, realtime) as graph:
+            wall = _watch(watcher, graph, realtime, progress)
+    finally:
+        watcher.close()
+    return watcher.reason, wall
+
+
+def _watch(
+    watcher: Watcher, graph: ProcessGraph, realtime: bool, progress: Callable[[int], None]
+) -> float:
+    """Look on until the plant says that the flight is over; returns the seconds that it took."""
+    last, since, started = -1, time.monotonic() + LONGEST_START, 0.0
+    while watcher.over is None:
+        watcher.look(LOOK)
+        progress(watcher.step)
+        now = time.monotonic()
+        if watcher.step != last:
+            started = started or now
+            last, since = watcher.step, now
+        elif now - since > LONGEST_SILENCE:
+            raise GraphError(f"the graph stopped at step {watcher.step}")
+        for name, code in graph.ended().items():
+            if realtime and name in graph.controllers and code != 2:
+                graph.start(name)
+            elif name != "plant" and watcher.over is None:
+                raise GraphError(f"{name} ended in flight with exit code {code}")
+    return time.monotonic() - started
