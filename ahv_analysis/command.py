@@ -24,6 +24,7 @@ from ahv_analysis.console import (
     progress_bar,
     show_table,
 )
+from ahv_analysis.faults_command import faults
 from ahv_plant.constants import DEGREES, INITIAL_MASS, STEP
 from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED
 
@@ -35,6 +36,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(monte_carlo, name="monte-carlo")
+app.add_typer(faults, name="faults")
 app.command()(table)
 
 

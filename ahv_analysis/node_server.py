@@ -1,4 +1,4 @@
-"""What the server that node processes are forked off loads once: all nodes, their laws compiled."""
+"""What the server that node processes are forked off loads once: the nodes and their laws."""
 
 from ahv_analysis.case import load_case
 from ahv_control.disturbance_learner import disturbance_estimate

@@ -10,6 +10,7 @@ from importlib import import_module
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,7 +18,8 @@ from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.case import Case, notes
 from ahv_analysis.errors import GraphError
-from ahv_msgs_py.base_node import REALTIME, BaseNode, quality
+from ahv_analysis.faulty_node import faulty
+from ahv_msgs_py.base_node import REALTIME, quality
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Value
@@ -44,17 +46,28 @@ def controllers(case: Case) -> list[str]:
     return [name for name in names if name != "disturbance_learner" or case.control.learner]
 
 
-def node_class(name: str) -> Callable[..., BaseNode]:
+def node_class(name: str) -> type[Any]:
     """Class of a node by its name in the graph."""
     module, _, attribute = NODES[name].rpartition(".")
-    found: Callable[..., BaseNode] = getattr(import_module(module), attribute)
-    return found
+    return getattr(import_module(module), attribute)  # type: ignore[no-any-return]
 
 
-def _run_node(name: str, values: dict[str, Value]) -> None:
+def _run_node(name: str, values: dict[str, Value], can_fail: bool) -> None:
     """Be the process of a node."""
     sys.argv = [name]
-    run(lambda: node_class(name)(values))
+    kind = faulty(node_class(name)) if can_fail and name != "recorder" else node_class(name)
+    run(lambda: kind(values))
+
+
+def set_transport(realtime: bool) -> None:
+    """Choose what carries the messages of the processes to be started, unless it is chosen.
+
+    In real time UDP on the loopback: through shared memory a node that was killed and started
+    again is not heard by some of the others for seconds.
+    """
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    if realtime:
+        os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
 
 
 class ProcessGraph:
@@ -64,14 +77,26 @@ class ProcessGraph:
     the time that a fresh interpreter takes.
     """
 
-    def __init__(self, case: Case, bag: Path | None, realtime: bool):
-        """Prepare the nodes of `case`; nothing runs yet."""
+    def __init__(
+        self,
+        case: Case,
+        bag: Path | None,
+        realtime: bool,
+        spectators: int = 0,
+        can_fail: bool = False,
+    ):
+        """Prepare the nodes of `case`; nothing runs yet.
+
+        `spectators` listen to the state from outside; nodes that `can_fail` do so when told to.
+        """
+        self._can_fail = can_fail
+        listeners = len(controllers(case)) + (bag is not None) + spectators
         mode: dict[str, Value] = {REALTIME.name: realtime}
         self.values = {name: case.parameters[name] | mode for name in controllers(case)}
         self.controllers = list(self.values)
         if bag is not None:
             self.values |= {"recorder": {"bag": str(bag), "notes": notes(case)} | mode}
-        self.values["plant"] = case.parameters["plant"] | mode | {"listeners": len(self.values)}
+        self.values["plant"] = case.parameters["plant"] | mode | {"listeners": listeners}
         self.processes: dict[str, BaseProcess] = {}
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(
@@ -86,7 +111,10 @@ class ProcessGraph:
     def start(self, name: str) -> None:
         """Start the process of a node."""
         process = self._context.Process(
-            target=_run_node, args=(name, self.values[name]), name=name, daemon=True
+            target=_run_node,
+            args=(name, self.values[name], self._can_fail),
+            name=name,
+            daemon=True,
         )
         process.start()
         self.processes[name] = process
@@ -101,6 +129,11 @@ class ProcessGraph:
         """End the process of a node as a crash would, and wait until it has gone."""
         self.processes[name].kill()
         self.processes[name].join()
+
+    def end_flight(self) -> None:
+        """End a flight before its time; the bag is closed."""
+        for name in ("plant", "recorder"):
+            self.signal(name, signal.SIGINT)
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the processes that have ended, by node."""
@@ -186,7 +219,7 @@ def fly_processes(
     In real time a controller that ends is started again at once. Returns why the flight ended
     early (empty if it did not) and the seconds that it took. Raises GraphError if the graph stops.
     """
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    set_transport(realtime)
     watcher = Watcher()
     try:
         with ProcessGraph(case, bag, realtime) as graph:

@@ -3,15 +3,18 @@
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 
 import rclpy
 from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
 
 from ahv_msgs_py.base_node import AUTOSTART, BaseNode
 from ahv_msgs_py.parameters import ParameterError
 
-FOREVER = 1e6  # [s] the executor must wait with a finite time, or it spins and is deaf to signals
+LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def run(node_class: Callable[[], BaseNode]) -> None:
@@ -20,8 +23,11 @@ def run(node_class: Callable[[], BaseNode]) -> None:
     It configures and activates itself; with `autostart` false the lifecycle services do that.
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    stop = threading.Event()
+    for number in SIGNALS:  # never in the middle of a message, and a second one changes nothing
+        signal.signal(number, lambda *_: stop.set())
     try:
-        rclpy.init()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # arguments that ROS itself refuses
         print(" ".join(str(error).split()), file=sys.stderr)
         sys.exit(2)
@@ -33,16 +39,13 @@ def run(node_class: Callable[[], BaseNode]) -> None:
         executor.add_node(node)
         if node.refusal or node.settings[AUTOSTART.name]:
             node.bring_up()
-        executor.spin_until_future_complete(node.finished, FOREVER)
-        code = 1 if node.finished.result() else 0
+        while not (node.finished.done() or stop.is_set()):
+            executor.spin_until_future_complete(node.finished, LOOK)
+        code = 1 if node.finished.done() and node.finished.result() else 0
     except ParameterError as error:
         print(error, file=sys.stderr)
         code = 2
-    except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
-        pass
     finally:
-        # a second Ctrl-C must not cut the ending short
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
             executor.remove_node(node)
         executor.shutdown()
