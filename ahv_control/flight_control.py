@@ -95,5 +95,6 @@ def next_adaptive_control(
     learner: LearnerState, before: State, answer: Commands, now: State, settings: FlightControl
 ) -> tuple[LearnerState, Commands]:
     """Learner and commands at the state `now`; `answer` was the one to the state `before`."""
-    learned = next_learner(learner, before, answer.surfaces, answer.rates, now, settings.learner)
+    law: LearnerSettings = settings.learner  # type: ignore[assignment]  # it is an adaptive flight
+    learned = next_learner(learner, before, answer.surfaces, answer.rates, now, law)
     return learned, adaptive_control(now, learned, answer.surfaces, settings)

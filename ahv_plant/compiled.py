@@ -9,10 +9,10 @@ NUMBA_DISABLE_JIT=1 runs the very same source as plain Python, `ahv_plant.lanes`
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
@@ -20,6 +20,7 @@ from numba.core import config
 from numba.extending import overload
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Value = TypeVar("Value")
 
 
 def source_hash() -> str:
@@ -45,7 +46,7 @@ _CACHE = _cache_directory()
 
 
 @contextmanager
-def _numba_cache_in(directory: Path):
+def _numba_cache_in(directory: Path) -> Iterator[None]:
     """Point numba at `directory` while one function sets up its cache, and nobody else's."""
     before, config.CACHE_DIR = config.CACHE_DIR, str(directory)
     try:
@@ -69,16 +70,17 @@ def _compile(function: Function, **options: bool) -> Function:
     if not config.DISABLE_JIT:
         with _numba_cache_in(_CACHE):
             dispatcher.enable_caching()
-    return dispatcher
+    return cast(Function, dispatcher)  # calls like the function, so type checkers see that
 
 
-def select(condition: Any, chosen: Any, other: Any) -> Any:
+def select(condition: bool, chosen: Value, other: Value) -> Value:
     """`chosen` where `condition` holds, else `other`: the conditional expression of lanes."""
     return chosen if condition else other
 
 
+# numba wants signature and implementation to agree, annotations and all, and a lambda has none
 @overload(select)
-def _compile_select(condition, chosen, other):
+def _compile_select(condition, chosen, other):  # type: ignore[no-untyped-def]
     if condition == types.boolean:
         return lambda condition, chosen, other: chosen if condition else other
     return None

@@ -11,6 +11,8 @@ for each number and one column for each run.
 
 import math
 import operator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from llvmlite import ir
 from numba import types
@@ -29,6 +31,9 @@ from numba.extending import (
 
 from ahv_plant.compiled import select
 
+Emit = Callable[..., ir.Value]  # of numba's context, the builder, the signature and the arguments
+Typed = tuple[types.Type, Emit] | None  # what an intrinsic returns: its signature and its code
+
 LANES = 16  # two vector registers of 8 doubles, to hide latencies
 
 
@@ -39,7 +44,7 @@ class Lanes(types.Type):
         self.dtype = dtype
         super().__init__(name=f"Lanes({dtype}, {LANES})")
 
-    def can_convert_from(self, typingctx, other):
+    def can_convert_from(self, typingctx: Any, other: types.Type) -> Conversion | None:
         """A plain number goes to all lanes, but rather to a function of plain numbers."""
         if isinstance(other, Lanes) or typingctx.can_convert(other, self.dtype) is None:
             return None
@@ -54,14 +59,16 @@ _OF = {types.float64: FLOATS, types.int64: INTEGERS, types.boolean: BOOLEANS}
 
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):
-    def __init__(self, dmm, fe_type):
+    def __init__(self, dmm: Any, fe_type: Lanes):
         element = dmm.lookup(fe_type.dtype).get_value_type()
         super().__init__(dmm, fe_type, ir.VectorType(element, LANES))
 
 
 @lower_cast(types.Number, Lanes)
 @lower_cast(types.Boolean, Lanes)
-def _to_all_lanes(context, builder, from_type, to_type, value):
+def _to_all_lanes(
+    context: Any, builder: ir.IRBuilder, from_type: types.Type, to_type: Lanes, value: ir.Value
+) -> ir.Value:
     value = context.cast(builder, value, from_type, to_type.dtype)
     vector = context.get_value_type(to_type)
     index = ir.Constant(ir.IntType(32), 0)
@@ -70,24 +77,26 @@ def _to_all_lanes(context, builder, from_type, to_type, value):
     return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), zeros)
 
 
-def _operation(function, count, argument, result, emit):
+def _operation(
+    function: Callable[..., Any], count: int, argument: Lanes, result: Lanes, emit: Emit
+) -> None:
     """Let compiled code use `function` of `count` arguments on lanes."""
 
     @infer_global(function)
     class _Template(AbstractTemplate):
-        def generic(self, args, kws):
+        def generic(self, args: tuple[types.Type, ...], kws: Any) -> Any:
             fits = len(args) == count and any(a == argument for a in args)
             if fits and all(self.context.can_convert(a, argument) is not None for a in args):
                 return signature(result, *[argument] * count)
             return None
 
     @lower_builtin(function, *[argument] * count)
-    def _lower(context, builder, sig, args):
+    def _lower(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
         return emit(builder, *args)
 
 
-def _llvm(name):
-    def emit(builder, value):
+def _llvm(name: str) -> Emit:
+    def emit(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
         kind = ir.FunctionType(value.type, [value.type])
         full = f"llvm.{name}.v{LANES}f64"
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, full), [value])
@@ -120,30 +129,32 @@ _operation(math.sqrt, 1, FLOATS, FLOATS, _llvm("sqrt"))
 
 @infer_global(max)
 class _MaxTemplate(AbstractTemplate):
-    def generic(self, args, kws):
+    def generic(self, args: tuple[types.Type, ...], kws: Any) -> Any:
         return signature(FLOATS, *args) if args and all(a == FLOATS for a in args) else None
 
 
 @lower_builtin(max, types.VarArg(Lanes))
-def _lower_max(context, builder, sig, args):
+def _lower_max(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
     return do_minmax(context, builder, sig.args, args, operator.gt)
 
 
 @intrinsic
-def lanes_select(typingctx, condition, chosen, other):
+def lanes_select(
+    typingctx: Any, condition: types.Type, chosen: types.Type, other: types.Type
+) -> Typed:
     """`chosen` in the lanes where `condition` holds, else `other`."""
     if condition != BOOLEANS:
         return None
     dtypes = [a.dtype if isinstance(a, Lanes) else types.unliteral(a) for a in (chosen, other)]
     kind = _OF[typingctx.unify_types(*dtypes)]
 
-    def emit(context, builder, sig, args):
+    def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
         return builder.select(*args)
 
     return kind(BOOLEANS, kind, kind), emit
 
 
-def _leaves(kind):
+def _leaves(kind: types.Type) -> Iterator[tuple[tuple[int, ...], types.Type]]:
     """Yield the index path and type of each number in a nested tuple type."""
     if isinstance(kind, types.BaseTuple):
         for i, part in enumerate(kind):
@@ -153,7 +164,7 @@ def _leaves(kind):
         yield (), kind
 
 
-def _widened(kind):
+def _widened(kind: types.Type) -> types.Type:
     """Return the nested tuple type with lanes of floats and integers for plain ones."""
     if isinstance(kind, types.BaseTuple):
         parts = tuple(_widened(part) for part in kind)
@@ -163,11 +174,13 @@ def _widened(kind):
     return kind
 
 
-def _part(builder, value, path):
+def _part(builder: ir.IRBuilder, value: ir.Value, path: tuple[int, ...]) -> ir.Value:
     return builder.extract_value(value, path) if path else value
 
 
-def _filled(context, builder, kind, values):
+def _filled(
+    context: Any, builder: ir.IRBuilder, kind: types.Type, values: Iterator[ir.Value]
+) -> ir.Value:
     """Build a nested tuple of type `kind` from an iterator of its leaves."""
     if not isinstance(kind, types.BaseTuple):
         return context.get_dummy_value() if kind is types.none else next(values)
@@ -176,14 +189,14 @@ def _filled(context, builder, kind, values):
 
 
 @intrinsic
-def widen(typingctx, value, sample):
+def widen(typingctx: Any, value: types.Type, sample: types.Type) -> Typed:
     """Put every number of a nested tuple into all lanes if `sample` is lanes, so that types agree.
 
     Beside a plain `sample`, and for lanes, booleans and None, nothing changes.
     """
     kind = _widened(value) if isinstance(sample, Lanes) else value
 
-    def emit(context, builder, sig, args):
+    def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
         if kind == value:
             return args[0]
         wide = (
@@ -195,7 +208,14 @@ def widen(typingctx, value, sample):
     return kind(value, sample), emit
 
 
-def _row(context, builder, array_type, array, row, vector):
+def _row(
+    context: Any,
+    builder: ir.IRBuilder,
+    array_type: types.Array,
+    array: ir.Value,
+    row: int,
+    vector: ir.Type,
+) -> ir.Value:
     """Return the address of LANES numbers in a row of a C-contiguous array."""
     array = context.make_array(array_type)(context, builder, array)
     step = cgutils.unpack_tuple(builder, array.shape)[1]
@@ -204,14 +224,14 @@ def _row(context, builder, array_type, array, row, vector):
 
 
 @intrinsic
-def load(typingctx, like, array):
+def load(typingctx: Any, like: types.Type, array: types.Array) -> Typed:
     """Fill a nested tuple `like` this with lanes from successive rows of `array`."""
     kind = _widened(like)
 
-    def emit(context, builder, sig, args):
+    def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
         vector = context.get_value_type(FLOATS)
 
-        def values():
+        def values() -> Iterator[ir.Value]:
             for row, _ in enumerate(_leaves(kind)):
                 place = _row(context, builder, array, args[1], row, vector)
                 yield builder.load(place, align=8)
@@ -222,10 +242,10 @@ def load(typingctx, like, array):
 
 
 @intrinsic
-def store(typingctx, array, value):
+def store(typingctx: Any, array: types.Array, value: types.Type) -> Typed:
     """Write the lanes of a nested tuple, all numbers, to successive rows of a float `array`."""
 
-    def emit(context, builder, sig, args):
+    def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
         vector = context.get_value_type(FLOATS)
         for row, (path, leaf) in enumerate(_leaves(value)):
             part = _part(builder, args[1], path)
@@ -242,7 +262,7 @@ def store(typingctx, array, value):
 
 
 @overload(select)
-def _select(condition, chosen, other):
+def _select(condition, chosen, other):  # type: ignore[no-untyped-def]  # as in compiled.py
     if condition == BOOLEANS:
         return lambda condition, chosen, other: lanes_select(condition, chosen, other)
     return None

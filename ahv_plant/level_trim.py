@@ -25,7 +25,7 @@ class LevelTrim(NamedTuple):
     alpha: float  # [rad] angle of attack and pitch
     elevon: float  # [rad] both elevons
     throttle: float  # [-]
-    exists: bool  # found, with elevons and throttle inside their stops
+    exists: float  # [-] 1 if found with elevons and throttle inside their stops, else 0
 
 
 @elementwise
