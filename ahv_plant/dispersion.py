@@ -1,4 +1,4 @@
-"""What the real vehicle has and its flight control does not know: dispersions and disturbances.
+"""What the real vehicle has and its flight control does not know (sections 4.1 and 4.3).
 
 Only the plant may import this module; a test sees to it.
 """
@@ -63,7 +63,7 @@ NOMINAL = Truth()
 
 
 def draw_dispersion(level: float, seed: int, run: int) -> Dispersion:
-    """Multipliers 1 + U(-level, level), one each, of the run `run` of the campaign `seed`.
+    """Multipliers 1 + U(-level, level) [-], one each, of the run `run` of the campaign `seed`.
 
     Any run can be drawn again alone, with the same bits.
     """

@@ -9,17 +9,17 @@ from math import sqrt
 
 from ahv_plant.compiled import elementwise, select
 
-TWO_OVER_PI = 0.6366197723675814
+TWO_OVER_PI = 0.6366197723675814  # [1/rad]
 # pi/2 in three parts; the first two have 33 bits, so that n * part is exact for |n| < 2**20.
-HALF_PI_1 = 1.5707963267341256
-HALF_PI_2 = 6.077100506303966e-11
-HALF_PI_3 = 2.0222662487959506e-21
-HALF_PI = 1.5707963267948966
-QUARTER_PI = 0.7853981633974483
-TAN_EIGHTH_PI = 0.41421356237309503
+HALF_PI_1 = 1.5707963267341256  # [rad]
+HALF_PI_2 = 6.077100506303966e-11  # [rad]
+HALF_PI_3 = 2.0222662487959506e-21  # [rad]
+HALF_PI = 1.5707963267948966  # [rad]
+QUARTER_PI = 0.7853981633974483  # [rad]
+TAN_EIGHTH_PI = 0.41421356237309503  # [-]
 # Adding and taking away 1.5 * 2**52 rounds a double of moderate size to the nearest integer.
-ROUNDER = 6755399441055744.0
-LOG_1_34 = 0.29266961396282004
+ROUNDER = 6755399441055744.0  # [-]
+LOG_1_34 = 0.29266961396282004  # [-]
 
 
 @elementwise
@@ -83,7 +83,7 @@ def asin(x: float) -> float:
 
 @elementwise
 def log_near_one(x: float) -> float:
-    """Natural logarithm for 0.7 <= x <= 1.4, the range of temperature ratios within a layer."""
+    """Natural logarithm [-] for 0.7 <= x <= 1.4, as temperature ratios are within a layer."""
     s = (x - 1.0) / (x + 1.0)  # log x = 2 atanh s
     z = s * s
     tail = 1.0 / 13.0 + z * (1.0 / 15.0 + z * (1.0 / 17.0 + z * (1.0 / 19.0 + z * (1.0 / 21.0))))
@@ -93,7 +93,7 @@ def log_near_one(x: float) -> float:
 
 @elementwise
 def exp_small(x: float) -> float:
-    """Exponential for |x| <= 10: Taylor at x/64, then six squarings."""
+    """Exponential [-] for |x| <= 10: Taylor at x/64, then six squarings."""
     r = x * 0.015625
     tail = 1.0 / 5040.0 + r * (1.0 / 40320.0 + r * (1.0 / 362880.0 + r * (1.0 / 3628800.0)))
     tail = 1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0 + r * tail))
@@ -108,6 +108,6 @@ def exp_small(x: float) -> float:
 
 @elementwise
 def power(x: float, p: float) -> float:
-    """Power p of x for 0.08 <= x <= 1 and |p| <= 2: two square roots bring x near one."""
+    """Power p [-] of x [-], 0.08 <= x <= 1 and |p| <= 2: two square roots bring x near one."""
     root = sqrt(sqrt(x))
     return exp_small(4.0 * p * (log_near_one(root * 1.34) - LOG_1_34))

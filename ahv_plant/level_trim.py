@@ -1,4 +1,4 @@
-"""Does a vehicle have a trim at all? Level flight by two equations, in lanes too."""
+"""Does a vehicle have a trim at all? Section 3.5.1 by two equations, in lanes too."""
 
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ class LevelTrim(NamedTuple):
 def balance(
     alpha: float, elevon: float, altitude: float, speed: float, mass: float, truth: Truth
 ) -> tuple[float, float, float]:
-    """Rates of w, Q [m/s^2, rad/s^2] and the throttle that u needs, in level flight at `alpha`."""
+    """Rates of w, Q [m/s^2, rad/s^2] and the throttle [-] that u needs, level at `alpha` [rad]."""
     sine, cosine = sin_cos(alpha)
     state = State(
         speed, 0.0, speed * sine / cosine, 0.0, 0.0, 0.0, 0.0, alpha, 0.0, 0.0, 0.0, altitude, mass
@@ -45,7 +45,7 @@ def balance(
 def trim_step(
     alpha: float, elevon: float, altitude: float, speed: float, mass: float, truth: Truth
 ) -> tuple[float, float]:
-    """One Newton-Raphson step of the two equations w_dot = 0 and Q_dot = 0."""
+    """Take one Newton-Raphson step [rad] of the two equations w_dot = 0 and Q_dot = 0."""
     w, Q, _ = balance(alpha, elevon, altitude, speed, mass, truth)
     w_alpha, Q_alpha, _ = balance(alpha + DIFFERENCE, elevon, altitude, speed, mass, truth)
     w_elevon, Q_elevon, _ = balance(alpha, elevon + DIFFERENCE, altitude, speed, mass, truth)

@@ -43,7 +43,7 @@ class Surfaces(NamedTuple):
 
 @elementwise
 def clamp(value: float, lower: float, upper: float) -> float:
-    """Limit `value` to [lower, upper]."""
+    """Limit `value` to what lies between `lower` and `upper`, in any unit."""
     value = select(value < lower, lower, value)
     return select(value > upper, upper, value)
 
@@ -60,6 +60,6 @@ def limit_surfaces(surfaces: Surfaces) -> Surfaces:
 
 @elementwise
 def limit_throttle(throttle: float) -> float:
-    """Hold sigma_T within [0.1, 0.9] (section 3.5.2); what is not a number becomes the least."""
+    """Hold sigma_T [-] between 0.1 and 0.9, section 3.5.2; not a number becomes the least."""
     held = clamp(throttle, THROTTLE_MINIMUM, THROTTLE_MAXIMUM)
     return select(held == held, held, THROTTLE_MINIMUM)

@@ -38,7 +38,10 @@ class Trim(NamedTuple):
 
 
 def check_flight_condition(altitude: float, speed: float, mass: float, geometric: bool) -> None:
-    """Raise ValueError, naming field, value and range, where the vehicle model does not hold."""
+    """Raise ValueError, naming field, value and range, where the vehicle model does not hold.
+
+    `altitude` [m], `speed` [m/s], `mass` [kg]; `geometric` says which altitude it is.
+    """
     height = geopotential_altitude(altitude, geometric)
     if not ALTITUDE_MINIMUM <= height <= ALTITUDE_MAXIMUM:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""The vehicle: its equations of motion under held controls, and one Runge-Kutta step of them."""
+"""The vehicle: eqs 2.1-2.14 under held controls, and one Runge-Kutta step of them."""
 
 from ahv_plant.aerodynamics import Loads, aerodynamic_coefficients, air_data, loads
 from ahv_plant.compiled import elementwise

@@ -13,6 +13,13 @@ settings.load_profile("ahv")
 _domains = itertools.count(os.getpid())
 
 
+def pytest_collection_modifyitems(items):
+    """Take a test without a mark for one of the graph: it may start what it likes."""
+    for item in items:
+        if not any(map(item.get_closest_marker, ("unit", "docs"))):
+            item.add_marker(pytest.mark.graph)
+
+
 @pytest.fixture
 def domain():
     """A ROS domain that no other test of this run uses (above 101 ports are not safe)."""

@@ -10,6 +10,11 @@ CRUISE = State(
 )
 
 
+def as_python(function):
+    """The plain Python behind a compiled function, which takes numbers of any kind."""
+    return getattr(function, "py_func", function)
+
+
 def between(low, high):
     """Floats of a closed interval."""
     return st.floats(low, high, allow_nan=False)

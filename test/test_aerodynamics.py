@@ -12,7 +12,9 @@ from ahv_plant import aerodynamic_fits
 from ahv_plant.aerodynamics import aerodynamic_coefficients, air_data, control_coefficients
 from ahv_plant.constants import DEGREES, MEAN_CHORD, WING_SPAN
 from ahv_plant.state import Surfaces
-from test.flights import STATES, SURFACES, between
+from test.flights import STATES, SURFACES, as_python, between
+
+pytestmark = pytest.mark.unit
 
 Powers = tuple[int, int, int]  # of alpha, Mach, deflection
 
@@ -72,7 +74,7 @@ def test_there_are_22_polynomials():
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_polynomial_has_the_published_terms(name):
-    function = getattr(aerodynamic_fits, name).py_func
+    function = as_python(getattr(aerodynamic_fits, name))
     if name in WITH_DEFLECTION:
         built, _ = function(ALPHA, MACH, DEFLECTION)
     else:

@@ -10,6 +10,8 @@ from ahv_plant.atmosphere import (
 )
 from test.flights import between
 
+pytestmark = pytest.mark.unit
+
 
 @pytest.mark.parametrize(
     "altitude, temperature, pressure, density",

@@ -9,6 +9,8 @@ from ahv_msgs_py.parameters import ParameterError
 from ahv_plant.constants import RADIANS
 from ahv_plant.dispersion import NOMINAL
 
+pytestmark = pytest.mark.unit
+
 TEXT = (config_folder() / "cases" / "nominal_di.yaml").read_text()
 
 

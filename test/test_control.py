@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 
 from ahv_control.error_dynamics import ErrorDynamics
+from ahv_control.flight_control import FlightControl, nominal_control
 from ahv_control.inner_loop import InnerLoop, nominal_surfaces
 from ahv_control.intermediate_loop import IntermediateLoop, Rates, rate_command
 from ahv_control.newton_raphson import (
@@ -28,6 +29,8 @@ from ahv_plant.dispersion import NOMINAL
 from ahv_plant.state import Surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import CRUISE, STATES, SURFACES, between, degrees
+
+pytestmark = pytest.mark.unit
 
 NEUTRAL = Surfaces(0.0, 0.0, 0.0)
 
@@ -152,3 +155,18 @@ def test_at_trim_the_loops_ask_for_trim():
         found.state, solution.surfaces, VelocityLoop(found.state.u, 0.01, False)
     )
     assert throttle == pytest.approx(found.throttle, abs=1e-9)
+
+
+@given(STATES, SURFACES)
+def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous):
+    outer = OuterLoop(24000.0, 0.01, math.pi)
+    intermediate = IntermediateLoop(0.2, 0.2, 0.2)
+    inner, velocity = inner_loop(Rates(2.0, 2.0, 2.0)), VelocityLoop(1786.4, 0.01, False)
+    answer = nominal_control(
+        state, previous, FlightControl(outer, intermediate, inner, velocity, None)
+    )
+    assert answer.attitude == attitude_command(state, outer)
+    assert answer.rates == rate_command(state, answer.attitude, intermediate)
+    surfaces = nominal_surfaces(state, answer.rates, previous, inner)
+    assert (answer.surfaces, answer.status) == surfaces
+    assert answer.throttle == throttle_command(state, answer.surfaces, velocity)

@@ -36,6 +36,8 @@ from ahv_plant.state import Surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import STATES, SURFACES, between
 
+pytestmark = pytest.mark.unit
+
 LEVEL = Surfaces(-0.1, -0.1, 0.0)
 MULTIPLIERS = st.builds(Dispersion, *[between(0.5, 1.5)] * 9)
 

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from ahv_plant.elementary import asin, atan, exp_small, log_near_one, power, sin_cos
 from test.flights import between
 
+pytestmark = pytest.mark.unit
+
 
 def ulps(found, exact):
     """Distance of a double from the exact value in units of its last place."""

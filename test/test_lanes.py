@@ -145,6 +145,7 @@ print(*adaptive_block.inspect_asm().values())
 """
 
 
+@pytest.mark.slow
 def test_the_machine_code_is_packed(tmp_path):
     """Compiled afresh, for the cache keeps no assembly."""
     result = subprocess.run(
@@ -220,6 +221,7 @@ def test_a_trajectory_to_draw_is_that_of_the_flight():
         assert same_bits(getattr(kept, name), getattr(flown, name)[::10]), name
 
 
+@pytest.mark.unit
 @pytest.mark.parametrize("run", range(6))
 def test_level_trim_is_the_trim_of_all_seven_equations(run):
     truth = Truth(dispersion=draw_dispersion(0.4, SEED, run))

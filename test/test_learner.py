@@ -29,7 +29,9 @@ from ahv_plant.constants import DEGREES, RADIANS, STEP
 from ahv_plant.dispersion import NOMINAL, disturbance_acceleration
 from ahv_plant.state import Surfaces
 from ahv_plant.vehicle import vehicle_step
-from test.flights import CRUISE, between
+from test.flights import CRUISE, as_python, between
+
+pytestmark = pytest.mark.unit
 
 PLAIN = ErrorDynamics(Rates(2.0, 2.0, 2.0), Rates(1.0, 1.0, 1.0), 1.0)
 SETTINGS = LearnerSettings(PLAIN, Rates(15.0, 18.0, 15.0), 0.7, 40.0, 0.01, False)
@@ -64,7 +66,7 @@ def test_jacobian_of_eq_4_14_is_the_complex_step_derivative(rates):
     for column in range(3):
         stepped = [complex(rate) for rate in rates]
         stepped[column] += 1e-30j
-        expected = np.imag(np.array(basis.py_func(*stepped), dtype=complex)) / 1e-30
+        expected = np.imag(np.array(as_python(basis)(*stepped), dtype=complex)) / 1e-30
         assert jacobian(rates)[:, column] == pytest.approx(expected, rel=1e-13, abs=1e-13)
 
 
@@ -181,6 +183,7 @@ def test_the_estimate_converges_to_the_disturbance(name, disturbance, bound):
         assert np.max(np.abs(late)) < np.max(np.abs(early)), name
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("part", ["constant", "amplitude", "Q"])
 def test_in_flight_the_estimate_is_the_disturbance_of_the_plant(part):
     """On the nominal vehicle all that the learner can find is the disturbance d(t, X)."""
@@ -217,6 +220,7 @@ def lyapunov(error, weights_error, slope_error, settings):
     )
 
 
+@pytest.mark.compiled
 def test_the_lyapunov_function_falls_along_a_flight():
     """Eq 4.11 with known ideal weights does not rise outside a residual set.
 

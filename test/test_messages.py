@@ -24,6 +24,8 @@ from ahv_msgs_py.topics import (
 )
 from ahv_plant.state import State, Surfaces
 
+pytestmark = pytest.mark.unit
+
 STORE = get_typestore(Stores.ROS2_JAZZY)
 STAMPS = st.integers(0, 2**31 * 10**9 - 1)
 ANY_DOUBLE = st.floats(width=64)

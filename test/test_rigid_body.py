@@ -15,6 +15,8 @@ from ahv_plant.mass_properties import Inertia
 from ahv_plant.rigid_body import angular_acceleration, motion
 from test.flights import STATES, between
 
+pytestmark = pytest.mark.unit
+
 SLUG_FT2 = 1.3558179483314004  # [kg m^2]
 BRICK = Inertia(*(value * SLUG_FT2 for value in (0.001894220, 0.006211019, 0.007194665)))
 

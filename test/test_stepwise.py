@@ -1,9 +1,12 @@
 """A step is answered once, when all its inputs are there, in whatever order they come."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ahv_msgs_py.stepwise import Stepwise
+
+pytestmark = pytest.mark.unit
 
 STEP = 10
 

