@@ -93,16 +93,16 @@ NOMINAL_TOPICS = (STATE, ATTITUDE_COMMAND, RATE_COMMAND, SURFACE_COMMAND, THROTT
 DISTURBANCE_ESTIMATE = LoopTopic(
     "/ahv/disturbance_estimate",
     StampedAcceleration(BODY_FRAME, ("x", "y", "z", "P", "Q", "R")),
-    "m/s^2 (zero), rad/s^2",
+    "m/s^2, m/s^2, m/s^2, rad/s^2, rad/s^2, rad/s^2",
     (_FINITE,) * 6,
-    "learned disturbance d-hat of the rates of P, Q, R, as angular acceleration",
+    "learned disturbance d-hat of the rates of P, Q, R, as angular acceleration; no linear part",
 )
 LEARNER = LoopTopic(
     "/ahv/learner",
     NamedVector(BODY_FRAME, LEARNER_NAMES),
-    "rad/s for X_a and X_d; weights in deg/s^2 by the units of the basis in deg/s",
+    ", ".join(["rad/s"] * 6 + ["deg/s^2 by that of the term in deg/s"] * (3 * len(BASIS_NAMES))),
     (_FINITE,) * len(LEARNER_NAMES),
-    "state of the disturbance learner: approximate plant, desired plant, weights",
+    "state of the disturbance learner: approximate plant, desired plant, weights of every term",
 )
 LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)
 LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS

@@ -1,0 +1,151 @@
+"""What the documents say of topics, parameters and the graph, written from the code.
+
+A page asks for a part between the marks `<!-- reference NAME -->` and `<!-- end -->`, and
+`python -m ahv_analysis.reference` fills in what stands between them; a test sees that it has.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from ahv_analysis.case import NODES
+from ahv_analysis.recorder_node import RECORDER_PARAMETERS
+from ahv_msgs_py.parameters import Parameter, Value
+from ahv_msgs_py.topics import (
+    ATTITUDE_COMMAND,
+    DISTURBANCE_ESTIMATE,
+    LEARNER,
+    LOOP_TOPICS,
+    RATE_COMMAND,
+    STATE,
+    SURFACE_COMMAND,
+    THROTTLE_COMMAND,
+    VIEWER_TOPICS,
+    LoopTopic,
+)
+
+ROOT = Path(__file__).resolve().parent.parent
+MARKED = re.compile(r"(?<=<!-- reference )(\w+)( -->\n).*?(?=<!-- end -->)", re.DOTALL)
+
+# Which node sends a topic of the loop, and which listen; the recorder listens to all.
+ROUTES: dict[LoopTopic, tuple[str, tuple[str, ...]]] = {
+    STATE: ("plant", ("outer_intermediate", "disturbance_learner", "inner_loop", "velocity")),
+    ATTITUDE_COMMAND: ("outer_intermediate", ()),
+    RATE_COMMAND: ("outer_intermediate", ("disturbance_learner", "inner_loop")),
+    DISTURBANCE_ESTIMATE: ("disturbance_learner", ("inner_loop",)),
+    LEARNER: ("disturbance_learner", ("inner_loop",)),
+    SURFACE_COMMAND: ("inner_loop", ("plant", "velocity", "disturbance_learner")),
+    THROTTLE_COMMAND: ("velocity", ("plant",)),
+}
+ADAPTIVE = "disturbance_learner"  # flies in adaptive cases only
+PLACES = {
+    "geometry_msgs/msg/Vector3Stamped": [f"vector.{axis}" for axis in "xyz"],
+    "geometry_msgs/msg/AccelStamped": [
+        f"accel.{part}.{axis}" for part in ("linear", "angular") for axis in "xyz"
+    ],
+}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join("| " + " | ".join(map(str, line)) + " |\n" for line in lines)
+
+
+def graph() -> str:
+    """Mermaid flowchart of the control loop, dashed what adaptive cases add."""
+    lines = ["```mermaid", "flowchart LR"]
+    for topic, (sender, listeners) in ROUTES.items():
+        label = topic.name.rpartition("/")[2]
+        for listener in listeners:
+            arrow = "-. {} .->" if ADAPTIVE in (sender, listener) else "-- {} -->"
+            lines.append(f"    {sender} {arrow.format(label)} {listener}")
+    return "\n".join(lines) + "\n```\n"
+
+
+def loop_topics() -> str:
+    """Table of the topics of the loop, then of the numbers in each message."""
+    rows = (
+        (
+            f"`{topic.name}`",
+            topic.layout.type_name.replace("/msg/", "/"),
+            f"`{topic.layout.frame}`",
+            ROUTES[topic][0],
+            ", ".join(ROUTES[topic][1]),
+        )
+        for topic in LOOP_TOPICS
+    )
+    parts = [table(("topic", "type", "frame", "from", "to"), rows)]
+    parts += (
+        f"\n### {topic.name}\n\n"
+        f"{topic.description[0].upper()}{topic.description[1:]}.\n\n{_numbers(topic)}"
+        for topic in LOOP_TOPICS
+    )
+    return "".join(parts)
+
+
+def _numbers(topic: LoopTopic) -> str:
+    """Table of the numbers of a message: where they stand, what they are, in what unit."""
+    names, units = topic.layout.fields, topic.units.split(", ")
+    places = PLACES.get(topic.layout.type_name, [f"position[{i}]" for i in range(len(names))])
+    if len(units) == 1:
+        units *= len(names)
+    rows = zip((f"`{place}`" for place in places), names, units, strict=True)
+    return table(("place", "name", "unit"), rows)
+
+
+def viewer_topics() -> str:
+    """Table of the topics that nothing in the loop reads."""
+    rows = (
+        (f"`{topic.name}`", topic.type_name.replace("/msg/", "/"), topic.description)
+        for topic in VIEWER_TOPICS
+    )
+    return table(("topic", "type", "what"), rows)
+
+
+def parameters() -> str:
+    """Table of the parameters of every node."""
+    head = ("parameter", "default", "unit", "range", "in flight", "meaning")
+    return "\n".join(
+        f"## {node}\n\n{table(head, map(_parameter, known))}"
+        for node, known in (NODES | {"recorder": RECORDER_PARAMETERS}).items()
+    )
+
+
+def _parameter(parameter: Parameter) -> tuple[str, ...]:
+    low, high = parameter.minimum, parameter.maximum
+    return (
+        f"`{parameter.name}`",
+        f"`{_yaml(parameter.default)}`",
+        parameter.unit,
+        "" if low is None or high is None else f"{low:g} to {high:g}",
+        "yes" if getattr(parameter, "in_flight", False) else "",
+        parameter.description,
+    )
+
+
+def _yaml(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value!r}".replace("'", '"')
+
+
+PARTS: dict[str, Callable[[], str]] = {
+    function.__name__: function for function in (graph, loop_topics, viewer_topics, parameters)
+}
+
+
+def filled(page: str) -> str:
+    """The text of a page with every part that it asks for; KeyError if there is no such part."""
+    return MARKED.sub(lambda mark: mark[1] + mark[2] + PARTS[mark[1]](), page)
+
+
+def main() -> None:
+    """Fill in the parts that README and docs ask for."""
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        text = path.read_text()
+        if MARKED.search(text):
+            path.write_text(filled(text))
+            print(path.relative_to(ROOT))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""The documents say what the code says: parts written from it are up to date, and true."""
+
+from pathlib import Path
+
+import pytest
+import rclpy
+
+from ahv_analysis.case import load_case
+from ahv_analysis.graph_flight import fly_graph
+from ahv_analysis.reference import MARKED, PARTS, ROUTES, filled
+from ahv_msgs_py.topics import LOOP_TOPICS
+
+ROOT = Path(__file__).parent.parent
+PAGES = [path for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_a_page_is_what_the_code_makes_of_it(path):
+    text = path.read_text()
+    assert text == filled(text), "run python -m ahv_analysis.reference"
+    assert text.count("<!-- reference ") == len(MARKED.findall(text)), "a mark has no end"
+
+
+def test_every_part_is_asked_for():
+    asked = {name for path in PAGES for name, _ in MARKED.findall(path.read_text())}
+    assert asked == set(PARTS)
+
+
+def test_a_part_that_is_not_known_is_an_error():
+    with pytest.raises(KeyError, match="weather"):
+        filled("<!-- reference weather -->\n<!-- end -->\n")
+
+
+def test_the_graph_that_flies_is_the_one_that_is_drawn(domain):
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    observer = rclpy.create_node("observer", context=context)
+    seen = {}
+
+    def look(steps):
+        for topic in LOOP_TOPICS:
+            senders = {end.node_name for end in observer.get_publishers_info_by_topic(topic.name)}
+            ends = observer.get_subscriptions_info_by_topic(topic.name)
+            seen[topic] = (senders, {end.node_name for end in ends})
+
+    try:
+        case = load_case("neuro_adaptive_di", {"duration": 60.0})
+        fly_graph(case, None, domain=domain, progress=look)
+    finally:
+        observer.destroy_node()
+        rclpy.shutdown(context=context)
+    assert seen == {
+        topic: ({sender}, set(listeners)) for topic, (sender, listeners) in ROUTES.items()
+    }
