@@ -1,0 +1,137 @@
+"""The code of the documents: which there is, and how to run it."""
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from markdown_it import MarkdownIt
+
+ROOT = Path(__file__).parent.parent
+PAGES = sorted(
+    page for where in ("*.md", "docs/*.md", "examples/**/*.md") for page in ROOT.glob(where)
+)
+SLOW = "<!-- slow -->"  # above a block that takes minutes
+SHELL = ("", "sh")  # a block that does not say its language is one of commands
+ELSEWHERE = ("colcon", "git", "ros2", "rosdep", "source", "sudo")  # on a machine with ROS 2
+NODES = [path.name for path in (ROOT / "resource" / "nodes").iterdir()]
+LONGEST = 900  # [s]
+
+
+class Block(NamedTuple):
+    """A block of code of a page."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+    slow: bool
+
+    @property
+    def commands(self) -> list[str]:
+        """Its lines, each with those that it goes on in, without those that are comments."""
+        lines = map(str.strip, self.text.replace("\\\n", " ").splitlines())
+        return [line for line in lines if line and not line.startswith("#")]
+
+
+def _tokens(page: Path):
+    return MarkdownIt("commonmark").enable("table").parse(page.read_text())
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    """Every block of code of a page, fenced or indented, in order."""
+    before = None
+    for token in _tokens(page):
+        if token.type in ("fence", "code_block"):
+            slow = before is not None and before.content.strip() == SLOW
+            yield Block(page, token.map[0] + 1, token.info.strip(), token.content, slow)
+        before = token if token.type == "html_block" else None
+
+
+def _children(page: Path):
+    return (child for token in _tokens(page) for child in token.children or ())
+
+
+def spans(page: Path) -> list[str]:
+    """Every piece of code within the text of a page."""
+    return [child.content for child in _children(page) if child.type == "code_inline"]
+
+
+def links(page: Path) -> list[str]:
+    """Every address that a page points to, pictures too."""
+    found = (child.attrGet("href") or child.attrGet("src") for child in _children(page))
+    return [address for address in found if address]
+
+
+def programs(command: str) -> list[list[str]]:
+    """Words of every program that a command calls, one after another or by a pipe."""
+    words = shlex.shlex(command, posix=True, punctuation_chars=True)
+    words.whitespace_split = True
+    parts = [[]]
+    for word in words:
+        if set(word) <= set("&|;"):
+            parts.append([])
+        else:
+            parts[-1].append(word)
+    return parts
+
+
+def first_word(command: str) -> str:
+    """Return the program of a command."""
+    return command.split()[0]
+
+
+def clone(folder: Path) -> Path:
+    """Copy what a clone has, with the virtual environment: what commands write stays there."""
+    unwanted = shutil.ignore_patterns(".*", "__pycache__", "build", "campaigns", "flights")
+    shutil.copytree(ROOT, folder, ignore=unwanted)
+    (folder / ".venv").symlink_to(ROOT / ".venv")
+    return folder
+
+
+def run(block: Block, folder: Path, domain: int) -> None:
+    """Run the commands of a block in a clone as they stand, beside those for another machine."""
+    environment = os.environ | {
+        "PATH": f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}",
+        "ROS_DOMAIN_ID": str(domain),
+    }
+    commands = [line for line in block.commands if first_word(line) not in ELSEWHERE]
+    where = f"{block.page.name}:{block.line}"
+    if any(first_word(line) in NODES for line in commands):
+        _run_in_terminals(commands, folder, environment, where)
+    elif commands:
+        done = subprocess.run(
+            ["bash", "-euo", "pipefail", "-c", "\n".join(commands)],
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST,
+        )
+        assert done.returncode == 0, f"{where}: {done.stdout}{done.stderr}"
+
+
+def _run_in_terminals(commands, folder, environment, where):
+    """Run all commands at once: those of a flight end by themselves, the others by Ctrl-C."""
+    terminals = {
+        command: subprocess.Popen(
+            ["bash", "-c", f"exec {command}"], cwd=folder, env=environment, process_group=0
+        )
+        for command in commands
+    }
+    try:
+        for command, terminal in terminals.items():
+            if first_word(command) in ("plant", "recorder"):
+                assert terminal.wait(LONGEST) == 0, f"{where}: {command}"
+        for command, terminal in terminals.items():
+            assert terminal.poll() in (None, 0), f"{where}: {command}"
+            terminal.send_signal(signal.SIGINT)
+            assert terminal.wait(30) == 0, f"{where}: {command}"
+    finally:
+        for terminal in terminals.values():
+            terminal.kill()
+            terminal.wait()
