@@ -1,7 +1,8 @@
 # make fly    set up, fly the report's nominal case on the ROS graph, draw its figures
 # make test   set up, check style, types and spelling, run the tests, measure what they cover
-# make test-docs  run the commands of README and docs
-# make test-slow  run the tests that take minutes
+# make test-docs  set up, run the commands of README and docs
+# make test-slow  set up, run the tests that take minutes
+# make docs   set up, write the reference from the code into docs, API pages into build/docs
 # make bench  set up, measure the rates that docs/performance.md speaks of
 # make venv   set up alone: .venv, with ROS 2 from PyPI
 
@@ -11,10 +12,10 @@ PYTHON ?= $(shell for python in python3 python3.12 python3.11; do \
 OUT ?= flights/nominal_di-$(shell date +%Y%m%d-%H%M%S)
 BIN := .venv/bin
 READY := .venv/ready
-MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis launch test setup.py
-TEXTS := $(wildcard *.md *.rst *.cff docs) config Makefile package.xml
+MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis launch docs test setup.py
+TEXTS := $(wildcard *.md *.rst *.cff docs/*.md) config Makefile package.xml
 
-.PHONY: fly test test-docs test-slow bench venv clean
+.PHONY: fly docs test test-docs test-slow bench venv clean
 
 fly: venv
 	@$(BIN)/ahv fly nominal_di --out $(OUT)
@@ -34,6 +35,10 @@ test-docs: venv
 
 test-slow: venv
 	$(BIN)/python -m pytest -m slow
+
+docs: venv
+	$(BIN)/python -m ahv_analysis.reference
+	NUMBA_DISABLE_JIT=1 $(BIN)/python docs/api_pages.py
 
 bench: venv
 	@$(BIN)/python -m test.benchmark

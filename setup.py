@@ -61,6 +61,7 @@ setup(
             "markdown-it-py",  # code blocks of the documents
             "ruff",
             "mypy",
+            "pdoc",  # API pages
             "scipy-stubs",
             "codespell",
             "ros-jazzy-ament-flake8",

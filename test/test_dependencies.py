@@ -54,10 +54,10 @@ ROS = {
 KNOWN = PYTHON | {name: (bundle, name) for name, bundle in ROS.items()}
 
 
-def imported(*folders):
-    """Top-level modules that the files of the folders import, beside Python's and our own."""
+def imports(paths):
+    """Top-level modules that files import, beside Python's own."""
     found = set()
-    for path in (path for folder in folders for path in (ROOT / folder).glob("*.py")):
+    for path in paths:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
                 found |= {alias.name.partition(".")[0] for alias in node.names}
@@ -65,10 +65,25 @@ def imported(*folders):
                 found.add(node.module.partition(".")[0])
             elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
                 found.add(node.args[0].value.partition(".")[0])
-    return found - OURS - set(sys.stdlib_module_names)
+    return found - set(sys.stdlib_module_names)
 
 
-RUNNING, TESTING = imported(*OURS - {"test"}, "launch"), imported("test")
+def sources(folder):
+    return sorted((ROOT / folder).glob("*.py"))
+
+
+RUNNING = (
+    imports(path for folder in (*OURS - {"test"}, "launch") for path in sources(folder)) - OURS
+)
+TESTING = imports(sources("test")) - OURS
+
+
+MAY_IMPORT = {  # as docs/architecture.md says
+    "ahv_msgs_py": {"ahv_msgs_py"},
+    "ahv_plant": {"ahv_plant", "ahv_msgs_py"},
+    "ahv_control": {"ahv_control", "ahv_plant", "ahv_msgs_py"},
+    "ahv_analysis": OURS - {"test"},
+}
 
 
 def names(requirements):
@@ -111,3 +126,18 @@ def test_package_xml_depends_on_nothing_else(manifest):
     keys = {KNOWN[name][1] for name in RUNNING | TESTING | set(ROS)}
     declared = [*manifest.exec_depends, *manifest.test_depends]
     assert {dependency.name for dependency in declared} - keys == {"python3-setuptools"}
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_packages_import_in_one_direction(package):
+    assert imports(sources(package)) & OURS <= MAY_IMPORT[package]
+
+
+def test_laws_know_nothing_of_ros():
+    laws = [
+        path
+        for package in ("ahv_msgs_py", "ahv_plant", "ahv_control")
+        for path in sources(package)
+        if not path.name.endswith(("_node.py", "node_process.py"))
+    ]
+    assert not imports(laws) & set(ROS)
