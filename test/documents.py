@@ -1,6 +1,7 @@
 """The code of the documents: which there is, and how to run it."""
 
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -19,6 +20,7 @@ SLOW = "<!-- slow -->"  # above a block that takes minutes
 SHELL = ("", "sh")  # a block that does not say its language is one of commands
 ELSEWHERE = ("colcon", "git", "ros2", "rosdep", "source", "sudo")  # on a machine with ROS 2
 NODES = [path.name for path in (ROOT / "resource" / "nodes").iterdir()]
+SETTING = re.compile(r"[A-Z_]+=")  # of an environment variable, before a program
 LONGEST = 900  # [s]
 
 
@@ -75,14 +77,15 @@ def programs(command: str) -> list[list[str]]:
     for word in words:
         if set(word) <= set("&|;"):
             parts.append([])
-        else:
+        elif parts[-1] or not SETTING.match(word):
             parts[-1].append(word)
     return parts
 
 
 def first_word(command: str) -> str:
-    """Return the program of a command."""
-    return command.split()[0]
+    """Return the first program of a command, or what stands in its place."""
+    words = (word for word in command.split() if not SETTING.match(word))
+    return next(words, command)
 
 
 def clone(folder: Path) -> Path:

@@ -23,6 +23,7 @@ from test.documents import (
     SHELL,
     blocks,
     clone,
+    first_word,
     links,
     programs,
     run,
@@ -80,7 +81,7 @@ CHECKS = {"ahv": check_ahv, "make": check_make, "python": check_python, "ros2": 
 @pytest.mark.parametrize("place", COMMANDS)
 def test_what_a_command_names_exists(place):
     for command in COMMANDS[place]:
-        assert command.split()[0] in PROGRAMS, "no command: give its block the language `text`"
+        assert first_word(command) in PROGRAMS, "no command: give its block the language `text`"
         for program, *words in programs(command):
             if program in CHECKS:
                 CHECKS[program](words)
@@ -122,6 +123,7 @@ def test_files_that_are_named_exist(page):
 )
 def test_a_block_is_of_a_language_that_is_tested(block):
     """Commands and Python are run, settings are read, listings stand in a file of examples."""
+    assert "make test-slow" not in block.text, "it would run itself"
     if block.language in ("cpp", "cmake", "xml"):
         listings = (path for path in (ROOT / "examples").rglob("*") if path.is_file())
         assert any(block.text in path.read_text() for path in listings)
