@@ -97,18 +97,21 @@ def clone(folder: Path) -> Path:
 
 
 def run(block: Block, folder: Path, domain: int) -> None:
-    """Run the commands of a block in a clone as they stand, beside those for another machine."""
+    """Run the code of a block in a clone as it stands, without what is for another machine."""
     environment = os.environ | {
         "PATH": f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}",
         "ROS_DOMAIN_ID": str(domain),
     }
+    script = ["python", "-c", block.text]
     commands = [line for line in block.commands if first_word(line) not in ELSEWHERE]
+    if block.language in SHELL:
+        script = ["bash", "-euo", "pipefail", "-c", "\n".join(commands)]
     where = f"{block.page.name}:{block.line}"
     if any(first_word(line) in NODES for line in commands):
-        _run_in_terminals(commands, folder, environment, where)
-    elif commands:
+        run_in_terminals(commands, folder, environment)
+    else:
         done = subprocess.run(
-            ["bash", "-euo", "pipefail", "-c", "\n".join(commands)],
+            script,
             cwd=folder,
             env=environment,
             capture_output=True,
@@ -118,7 +121,7 @@ def run(block: Block, folder: Path, domain: int) -> None:
         assert done.returncode == 0, f"{where}: {done.stdout}{done.stderr}"
 
 
-def _run_in_terminals(commands, folder, environment, where):
+def run_in_terminals(commands: list[str], folder: Path, environment: dict[str, str]) -> None:
     """Run all commands at once: those of a flight end by themselves, the others by Ctrl-C."""
     terminals = {
         command: subprocess.Popen(
@@ -129,11 +132,11 @@ def _run_in_terminals(commands, folder, environment, where):
     try:
         for command, terminal in terminals.items():
             if first_word(command) in ("plant", "recorder"):
-                assert terminal.wait(LONGEST) == 0, f"{where}: {command}"
+                assert terminal.wait(LONGEST) == 0, command
         for command, terminal in terminals.items():
-            assert terminal.poll() in (None, 0), f"{where}: {command}"
+            assert terminal.poll() in (None, 0), command
             terminal.send_signal(signal.SIGINT)
-            assert terminal.wait(30) == 0, f"{where}: {command}"
+            assert terminal.wait(30) == 0, command
     finally:
         for terminal in terminals.values():
             terminal.kill()

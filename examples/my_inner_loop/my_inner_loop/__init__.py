@@ -1,0 +1,1 @@
+"""An inner loop of one's own in the graph of ahv."""
