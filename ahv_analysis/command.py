@@ -121,10 +121,10 @@ def fly(
     from ahv_analysis.flight import fly_library
     from ahv_analysis.summary import summarize
 
-    changes = _dispersion(dispersion, seed, run)
+    changes, draw = _dispersion(dispersion, seed, run)
     if duration is not None:
         changes["duration"] = duration
-    flight = load_case(case, changes)
+    flight = load_case(case, changes, draw)
     folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     bag, summary_file = folder / "bag", folder / "summary.json"
     for path in (bag, summary_file):
@@ -152,17 +152,17 @@ def fly(
         raise typer.Exit(1)
 
 
-def _dispersion(choice: str | None, seed: int, run: int) -> dict[str, object]:
-    """Plant parameters of the option --dispersion."""
-    from ahv_analysis.case import dispersion_parameters, load_dispersion
+def _dispersion(choice: str | None, seed: int, run: int) -> tuple[dict[str, object], Any]:
+    """Plant parameters of the option --dispersion, and the Draw that they come from, if any."""
+    from ahv_analysis.case import Draw, dispersion_parameters, load_dispersion
     from ahv_plant.dispersion import draw_dispersion
 
     if choice is None:
-        return {}
+        return {}, None
     if choice.endswith((".yaml", ".yml")):
         if not Path(choice).is_file():
             raise UsageError(f"dispersion {choice} is not a file")
-        return load_dispersion(Path(choice))
+        return load_dispersion(Path(choice)), None
     try:
         level = float(choice)
     except ValueError:
@@ -171,7 +171,8 @@ def _dispersion(choice: str | None, seed: int, run: int) -> dict[str, object]:
         raise UsageError(
             f"dispersion {choice!r} is neither a YAML file nor a level from 0 to {HIGHEST_LEVEL:g}"
         )
-    return dispersion_parameters(draw_dispersion(level, seed, run))
+    changes = dispersion_parameters(draw_dispersion(level, seed, run))
+    return changes, Draw(level, seed, run)
 
 
 def _print_summary(summary: dict[str, Any]) -> None:
