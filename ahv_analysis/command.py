@@ -23,6 +23,7 @@ from ahv_analysis.console import (
     progress_bar,
     show_table,
 )
+from ahv_analysis.report import report
 from ahv_plant.constants import DEGREES, INITIAL_MASS, STEP
 from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED
 
@@ -35,6 +36,7 @@ app = typer.Typer(
 )
 app.add_typer(monte_carlo, name="monte-carlo")
 app.command()(table)
+app.command()(report)
 
 
 class Engine(StrEnum):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ahv_analysis.case import Case
 from ahv_analysis.record import Array, FlightRecord
 from ahv_analysis.signals import AXES, CONTROLS, TRACKED, Settings
-from ahv_plant.constants import DEGREES, STEP, UNSTART_ALPHA
+from ahv_plant.constants import DEGREES, STEP, STEP_NS, UNSTART_ALPHA
 from ahv_plant.departure import departure_reason
 from ahv_plant.state import State, Surfaces
 from ahv_plant.vehicle import vehicle_step
@@ -50,6 +50,7 @@ class Margin(NamedTuple):
     largest_at_s: float
     margin_deg: float  # negative: exceeded
     beyond_s: float
+    first_beyond_s: float | None
 
 
 class Learning(NamedTuple):
@@ -125,11 +126,13 @@ def use(time: Array, command: Array, stops: tuple[float, float]) -> Use:
 def margin(time: Array, angle: Array, bound: float) -> Margin:
     """Margin of an angle (N+1,) to plus and minus `bound`, both [rad]; Margin is in degrees."""
     size = np.abs(angle)
+    beyond = size > bound
     return Margin(
         largest(angle) * DEGREES,
         float(time[np.argmax(size)]),
         (bound - largest(angle)) * DEGREES,
-        held(time, size > bound),
+        held(time, beyond),
+        float(time[np.argmax(beyond)]) if np.any(beyond) else None,
     )
 
 
@@ -170,13 +173,14 @@ def why_ended_early(record: FlightRecord, case: Case) -> str:
 
     The state that ended it is not in the bag: the last step is flown once more.
     """
-    if record.steps >= case.plant.steps:
+    flown = int(record.stamps[-1]) // STEP_NS  # steps, even if the bag lacks some
+    if flown >= case.plant.steps:
         return ""
-    truth, end = case.plant.truth, record.steps * STEP
+    truth, end = case.plant.truth, flown * STEP
     last = State(*record.states[-1].tolist())
     surfaces = Surfaces(*record.surfaces[-1].tolist())
     later = State(*vehicle_step(last, surfaces, float(record.throttle[-1]), end, truth))
-    reason = departure_reason(later, truth.geometric, (record.steps + 1) * STEP)
+    reason = departure_reason(later, truth.geometric, (flown + 1) * STEP)
     return reason or f"the recording stops at {end:g} s of {case.plant.steps * STEP:g} s"
 
 
