@@ -17,7 +17,7 @@ NODES = {
 DATA = [
     ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
     (f"share/{NAME}", ["package.xml"]),
-    *((f"share/{NAME}/{folder}", glob(f"{folder}/*.yaml")) for folder in glob("config/*")),
+    *((f"share/{NAME}/{folder}", glob(f"{folder}/*.*")) for folder in glob("config/*")),
     (f"share/{NAME}/launch", glob("launch/*.launch.py")),
 ]
 if "bdist_wheel" in sys.argv:
@@ -31,6 +31,8 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=["ahv_plant", "ahv_control", "ahv_msgs_py", "ahv_analysis"],
+    # template, style and script of `ahv report`; uPlot (MIT) among them, for it is not on PyPI
+    package_data={"ahv_analysis": ["page/*"]},
     data_files=DATA,
     install_requires=[
         "setuptools",
@@ -39,6 +41,7 @@ setup(
         "numba>=0.60",  # the vehicle and the laws at machine speed
         "rosbags>=0.11",  # MCAP bags without a ROS installation
         "matplotlib",  # figures
+        "jinja2",  # pages of `ahv report`
         "typer",  # the `ahv` command
         "rich",  # its tables and progress bars
         "pyyaml",  # case files
@@ -59,6 +62,7 @@ setup(
             "mpmath",
             "catkin_pkg",  # what ROS itself reads package.xml with
             "markdown-it-py",  # code blocks of the documents
+            "playwright",  # looks at the pages with a Chromium of the machine's
             "ruff",
             "mypy",
             "pdoc",  # API pages

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from scipy.stats import binomtest
 
 from ahv_analysis.block import find_trims, fly_block
-from ahv_analysis.case import Case, dispersion_parameters, make_case
+from ahv_analysis.case import Case, Draw, dispersion_parameters, make_case
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.record import Array
 from ahv_analysis.tally import Cause, Tally
@@ -80,7 +80,8 @@ class Campaign:
             )
             for (name, spread), draw in zip(START_SPREAD.items(), draws.tolist(), strict=True):
                 plant[name] = float(plant[name]) + spread * draw
-        return make_case(self.case.name, self.case.parameters | {"plant": plant})
+        draw = Draw(self.level, self.seed, run, self.random_starts)
+        return make_case(self.case.name, self.case.parameters | {"plant": plant}, draw)
 
 
 def fly_runs(campaign: Campaign, first: int, count: int) -> dict[str, Array]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import yaml
 
+from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
 from ahv_control.parameters import (
     INNER_LOOP_PARAMETERS,
@@ -38,6 +39,15 @@ NODES = {
 }
 
 
+class Draw(NamedTuple):
+    """Where a drawn vehicle comes from: it can be drawn again, with the same bits."""
+
+    level: float  # [-]
+    seed: int  # of the campaign
+    run: int
+    random_start: bool = False  # the start is drawn as well
+
+
 class Case(NamedTuple):
     """A flight as it is set up."""
 
@@ -45,11 +55,15 @@ class Case(NamedTuple):
     parameters: dict[str, dict[str, Value]]  # of every node, complete and checked
     plant: PlantSettings
     control: FlightControl
+    draw: Draw | None = None  # of the dispersion among the parameters, if it was drawn
 
 
 def notes(case: Case) -> str:
-    """What to file with the bag of a flight: the case's name and all parameters, as JSON."""
-    return json.dumps({"case": case.name, "parameters": case.parameters})
+    """What to file with the bag of a flight, as JSON: case, parameters, draw and versions."""
+    content = {"case": case.name, "parameters": case.parameters, "versions": versions()}
+    if case.draw is not None:
+        content["draw"] = case.draw._asdict()
+    return json.dumps(content)
 
 
 def config_folder() -> Path:
@@ -69,10 +83,13 @@ def case_names() -> list[str]:
     return sorted(path.stem for path in (config_folder() / "cases").glob("*.yaml"))
 
 
-def load_case(name: str, plant: Mapping[str, object] | None = None) -> Case:
+def load_case(
+    name: str, plant: Mapping[str, object] | None = None, draw: Draw | None = None
+) -> Case:
     """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
 
-    `plant` replaces parameters of the plant: a dispersion, another start or duration.
+    `plant` replaces parameters of the plant: a dispersion, another start or duration; `draw` says
+    where the dispersion comes from, if it was drawn.
     """
     path = Path(name)
     if path.suffix not in (".yaml", ".yml"):
@@ -83,7 +100,7 @@ def load_case(name: str, plant: Mapping[str, object] | None = None) -> Case:
         )
     given = _read(path)
     given["plant"] |= plant or {}
-    return make_case(path.stem, given)
+    return make_case(path.stem, given, draw)
 
 
 def dispersion_parameters(dispersion: Dispersion) -> dict[str, object]:
@@ -104,7 +121,9 @@ def load_dispersion(path: Path) -> dict[str, object]:
     return given["plant"]
 
 
-def make_case(name: str, given: Mapping[str, Mapping[str, object]]) -> Case:
+def make_case(
+    name: str, given: Mapping[str, Mapping[str, object]], draw: Draw | None = None
+) -> Case:
     """Case of the parameters `given` for each node; ParameterError names what is wrong."""
     parameters = {
         node: check_parameters(f"{name}: {node}", known, given[node])
@@ -118,7 +137,7 @@ def make_case(name: str, given: Mapping[str, Mapping[str, object]]) -> Case:
         velocity_loop(parameters["velocity"]),
         learner_settings(parameters["disturbance_learner"]) if adaptive else None,
     )
-    return Case(name, parameters, plant_settings(parameters["plant"]), control)
+    return Case(name, parameters, plant_settings(parameters["plant"]), control, draw)
 
 
 def _read(path: Path) -> dict[str, dict[str, object]]:

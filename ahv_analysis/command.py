@@ -25,6 +25,7 @@ from ahv_analysis.console import (
     show_table,
 )
 from ahv_analysis.faults_command import faults
+from ahv_analysis.report import report
 from ahv_plant.constants import DEGREES, INITIAL_MASS, STEP
 from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED
 
@@ -38,6 +39,7 @@ app = typer.Typer(
 app.add_typer(monte_carlo, name="monte-carlo")
 app.add_typer(faults, name="faults")
 app.command()(table)
+app.command()(report)
 
 
 class Engine(StrEnum):
@@ -130,10 +132,12 @@ def fly(
     from ahv_analysis.flight import fly_library
     from ahv_analysis.summary import summarize
 
-    changes = _dispersion(dispersion, seed, run)
+    if engine == Engine.library and (realtime or processes):
+        raise UsageError("--realtime and --processes are for the graph, not for --engine library")
+    changes, draw = _dispersion(dispersion, seed, run)
     if duration is not None:
         changes["duration"] = duration
-    flight = load_case(case, changes)
+    flight = load_case(case, changes, draw)
     folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     bag, summary_file = folder / "bag", folder / "summary.json"
     for path in (bag, summary_file):
@@ -168,17 +172,17 @@ def _engine(processes: bool) -> Callable[..., tuple[str, float]]:
     return fly_processes if processes else fly_graph
 
 
-def _dispersion(choice: str | None, seed: int, run: int) -> dict[str, object]:
-    """Plant parameters of the option --dispersion."""
-    from ahv_analysis.case import dispersion_parameters, load_dispersion
+def _dispersion(choice: str | None, seed: int, run: int) -> tuple[dict[str, object], Any]:
+    """Plant parameters of the option --dispersion, and the Draw that they come from, if any."""
+    from ahv_analysis.case import Draw, dispersion_parameters, load_dispersion
     from ahv_plant.dispersion import draw_dispersion
 
     if choice is None:
-        return {}
+        return {}, None
     if choice.endswith((".yaml", ".yml")):
         if not Path(choice).is_file():
             raise UsageError(f"dispersion {choice} is not a file")
-        return load_dispersion(Path(choice))
+        return load_dispersion(Path(choice)), None
     try:
         level = float(choice)
     except ValueError:
@@ -187,7 +191,8 @@ def _dispersion(choice: str | None, seed: int, run: int) -> dict[str, object]:
         raise UsageError(
             f"dispersion {choice!r} is neither a YAML file nor a level from 0 to {HIGHEST_LEVEL:g}"
         )
-    return dispersion_parameters(draw_dispersion(level, seed, run))
+    changes = dispersion_parameters(draw_dispersion(level, seed, run))
+    return changes, Draw(level, seed, run)
 
 
 def _print_summary(summary: dict[str, Any]) -> None:

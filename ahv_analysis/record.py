@@ -11,10 +11,11 @@ from ahv_analysis.flight import Step
 from ahv_control.disturbance_learner import disturbance_estimate
 from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import learner_values
+from ahv_control.newton_raphson import nominal_response
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_plant.aerodynamics import AirData, air_data
 from ahv_plant.constants import UNSTART_ALPHA
-from ahv_plant.state import State
+from ahv_plant.state import State, Surfaces
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,26 @@ class FlightRecord:
         climb = u * np.sin(theta) - down * np.cos(theta)
         angle: Array = np.arcsin(climb / self.air.speed)
         return angle
+
+    @property
+    def observer_error(self) -> Array | None:
+        """X - X_a (N+1, 3) [rad/s], the error of eq 4.9; None without a learner."""
+        return None if self.learner is None else self.states[:, 3:6] - self.learner[:, :3]
+
+    @cached_property
+    def actual_disturbance(self) -> Array:
+        """What the nominal model misses of the angular acceleration (N, 3) [rad/s^2], eq 4.2.
+
+        Of each step: the mean acceleration, (X_k+1 - X_k) / h, less the nominal f(X_k, U_k). That
+        is what the learner has to learn.
+        """
+        answers = zip(self.states[:-1].tolist(), self.surfaces[:-1].tolist(), strict=True)
+        nominal = [
+            nominal_response(State(*state), Surfaces(*surfaces), self.geometric)
+            for state, surfaces in answers
+        ]
+        mean = np.diff(self.states[:, 3:6], axis=0) / np.diff(self.time)[:, None]
+        return mean - np.reshape(nominal, (-1, 3))
 
     @property
     def inlet_started(self) -> bool:
