@@ -46,7 +46,7 @@ class DisturbanceLearnerNode(BaseNode):
         """File a state twice: as the start of its own step and as the end of the one before."""
         if self._learner is None:
             state = State(*values)
-            self._publish(stamp, state, first_learner(state))
+            self._publish(stamp, state, first_learner(state, self._law))
         self._put("before", stamp, values)
         self._put("now", stamp - STEP_NS, values)
 
