@@ -30,7 +30,7 @@ LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 def fly_adaptive(state, truth, control, steps):
     """Tally of an adaptive flight; the numbers may be lanes."""
     one = state.u
-    learner = widen(first_learner(state), one)
+    learner = widen(first_learner(state, control.learner), one)
     answer = widen(adaptive_control(state, learner, NEUTRAL, control), one)
     tally = widen(START, one)
     altitude = control.outer.altitude
@@ -84,7 +84,7 @@ def trim_block(dispersions, like, altitude, speed, mass, geometric, result):
 @kernel
 def adaptive_trajectory(state, truth, control, steps, every, states, commands):
     """Fly one adaptive run; keep every so many states (13) and commands (10)."""
-    learner = first_learner(state)
+    learner = first_learner(state, control.learner)
     answer = adaptive_control(state, learner, NEUTRAL, control)
     for step in range(steps + 1):
         if step % every == 0:

@@ -1,9 +1,6 @@
 """Monte-Carlo campaigns: drawn flights on any executor, one row a run, resumed if stopped."""
 
-import json
-import os
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -11,15 +8,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from scipy.stats import binomtest
 
 from ahv_analysis.block import find_trims, fly_block
+from ahv_analysis.campaign_store import (
+    PART_RUNS,
+    Columns,
+    level_folder,
+    part_file,
+    part_files,
+    read_part,
+    read_parts,
+    write_part,
+)
 from ahv_analysis.case import Case, Draw, dispersion_parameters, make_case
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.record import Array
-from ahv_analysis.tally import Cause, Tally
+from ahv_analysis.tally import Tally
 from ahv_plant.compiled import source_hash
 from ahv_plant.constants import DEGREES, STEP
 from ahv_plant.dispersion import Dispersion, draw_dispersion
@@ -28,7 +32,6 @@ from ahv_plant.state import State
 
 RUNS_PER_JOB = 64  # four blocks: half a second of work, so that little is lost and little waits
 JOBS_UNDER_WAY = 64  # handed to the executor at a time, so that a campaign of any size can wait
-SAVE_EVERY = 1024  # runs between two writes of the file, at least
 # Random starts of section 3.5.2, around the case's own: plus and minus, in the plant's parameters.
 START_SPREAD = {
     "initial.u": 100.0,  # [m/s]
@@ -37,9 +40,6 @@ START_SPREAD = {
     "initial.R": 5.0,  # [deg/s]
     "initial.h": 500.0,  # [m]
 }
-
-
-DESCRIBED = {"source", "case", "level", "seed", "random_starts", "parameters"}
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Campaign:
         return make_case(self.case.name, self.case.parameters | {"plant": plant}, draw)
 
 
-def fly_runs(campaign: Campaign, first: int, count: int) -> dict[str, Array]:
+def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     """Fly runs `first` to `first + count - 1`: a column a quantity, as in the campaign's file."""
     runs = range(first, first + count)
     dispersions = np.array([campaign.dispersion(run) for run in runs])
@@ -106,12 +106,10 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> dict[str, Array]:
     }
 
 
-def flight_columns(
-    runs: Array, dispersions: Array, states: Array, tallies: Array
-) -> dict[str, Array]:
+def flight_columns(runs: Array, dispersions: Array, states: Array, tallies: Array) -> Columns:
     """Columns of the campaign's file that a flight gives."""
     tally = Tally(*tallies.T)
-    table: dict[str, Array] = {"run": runs}
+    table: Columns = {"run": runs}
     table |= {name: dispersions[:, i] for i, name in enumerate(Dispersion._fields)}
     table |= {
         f"initial_{name}": states[:, State._fields.index(name)] for name in ("u", *"PQR", "h")
@@ -140,147 +138,122 @@ def fly_campaign(
     folder: Path,
     executor: Executor,
     progress: Callable[[int], None] = lambda runs: None,
-) -> dict[str, Array]:
-    """Fly what `folder` does not hold yet, keep it there, and return all columns by run.
+) -> None:
+    """Fly what `folder` does not hold yet of `campaign`, and keep it there.
 
     Jobs go to `executor`, whatever it is; a job that fails is an error, one whose worker died is
-    the executor's to repeat. Interrupted by KeyboardInterrupt, the folder keeps what was flown.
-    Raises CampaignError if the folder holds another campaign.
+    the executor's to repeat. A part is written when all of it is flown. Interrupted, by
+    KeyboardInterrupt or an error, the folder keeps what was flown. `progress(runs)` is called now
+    and then. Raises CampaignError if the folder holds another campaign or cannot hold any.
     """
+    kept = level_folder(folder, campaign.level)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        kept.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CampaignError(f"{folder} cannot hold a campaign: {error.strerror}") from error
-    before = _kept(campaign, folder)
-    done = set(before["run"].tolist()) if before else set()
-    jobs = (
-        (first, min(RUNS_PER_JOB, campaign.runs - first))
-        for first in range(0, campaign.runs, RUNS_PER_JOB)
-        if not done.issuperset(range(first, min(first + RUNS_PER_JOB, campaign.runs)))
+    described = campaign.describe()
+    count = sum(
+        int(np.sum(part["run"] < campaign.runs)) for part in read_parts(kept, ["run"], described)
     )
-    parts = [before] if before else []
-    under_way: set[Future[dict[str, Array]]] = set()
-    count = saved = min(len(done), campaign.runs)
     progress(count)
+    parts: dict[int, _Part] = {}
+    jobs = _jobs(campaign, kept, parts)
+    under_way: dict[Future[Columns], int] = {}
     try:
         while True:
-            for first, runs in islice(jobs, JOBS_UNDER_WAY - len(under_way)):
-                under_way.add(executor.submit(fly_runs, campaign, first, runs))
+            for start, first, runs in islice(jobs, JOBS_UNDER_WAY - len(under_way)):
+                under_way[executor.submit(fly_runs, campaign, first, runs)] = start
             if not under_way:
                 break
             finished, _ = wait(under_way, return_when=FIRST_COMPLETED)
             for future in finished:
-                under_way.discard(future)
-                parts.append(future.result())
-                count += len(parts[-1]["run"])
+                start = under_way.pop(future)
+                part = parts[start]
+                part.flown.append(future.result())
+                count += len(part.flown[-1]["run"])
+                part.jobs_left -= 1
+                if part.jobs_left == 0:
+                    write_part(part_file(kept, start), [*part.held, *part.flown], described)
+                    del parts[start]
             progress(min(count, campaign.runs))
-            if count - saved >= max(SAVE_EVERY, saved):  # seldom enough to stay a small part
-                parts, saved = [_write(campaign, folder, parts)], count
     finally:
-        for future in under_way:  # of an interrupted campaign
+        for future, start in under_way.items():  # of an interrupted campaign
             future.cancel()
-        parts += [future.result() for future in under_way if _is_flown(future)]
-        if parts:
-            _write(campaign, folder, parts)
-    return read_campaign(campaign, folder)
+            if future.done() and not future.cancelled() and future.exception() is None:
+                parts[start].flown.append(future.result())
+        for start, part in parts.items():
+            if part.flown:
+                write_part(part_file(kept, start), [*part.held, *part.flown], described)
 
 
-def _is_flown(future: Future[dict[str, Array]]) -> bool:
-    return future.done() and not future.cancelled() and future.exception() is None
+@dataclass
+class _Part:
+    """A part of which not everything is flown."""
+
+    held: list[Columns]  # by the folder
+    flown: list[Columns]
+    jobs_left: int
 
 
-def campaign_file(campaign: Campaign, folder: Path) -> Path:
-    """Parquet file of a campaign's level."""
-    return folder / f"runs-{campaign.level:g}.parquet"
+def _jobs(
+    campaign: Campaign, kept: Path, parts: dict[int, _Part]
+) -> Iterator[tuple[int, int, int]]:
+    """Jobs that are left to fly: first run of its part, first run, number of runs.
 
-
-def read_campaign(campaign: Campaign, folder: Path) -> dict[str, Array]:
-    """Columns flown so far, sorted by run, at most those of the campaign; {} if there are none."""
-    table = _kept(campaign, folder)
-    return {name: column[table["run"] < campaign.runs] for name, column in table.items()}
-
-
-def _kept(campaign: Campaign, folder: Path) -> dict[str, Array]:
-    """All columns that the folder holds of this campaign, of however many runs; {} if none."""
-    path = campaign_file(campaign, folder)
-    if not path.exists():
-        return {}
-    table, description = read_runs(path)
-    if description != json.loads(json.dumps(campaign.describe())):
-        raise CampaignError(
-            f"{path} holds another campaign, or one of other code: choose another --out"
-        )
-    return table
-
-
-def read_runs(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Columns of a campaign file, and the description of the campaign."""
-    try:
-        table = pq.read_table(path)
-        description = json.loads(table.schema.metadata[b"ahv"])
-        columns = {name: table[name].to_numpy() for name in table.column_names}
-        if not {"run", "cause"} <= columns.keys() or not set(description) >= DESCRIBED:
-            raise ValueError("it lacks columns or the description")
-    except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise CampaignError(f"{path} is not the file of a campaign: {reason}") from error
-    return columns, description
+    A part enters `parts` with its first job, so that only those under way are in memory.
+    """
+    for start in range(0, campaign.runs, PART_RUNS):
+        end = min(start + PART_RUNS, campaign.runs)
+        path = part_file(kept, start)
+        held = [read_part(path)[0]] if path.exists() else []
+        done = set(held[0]["run"].tolist()) if held else set()
+        jobs = [
+            (start, first, min(RUNS_PER_JOB, end - first))
+            for first in range(start, end, RUNS_PER_JOB)
+            if not done.issuperset(range(first, min(first + RUNS_PER_JOB, end)))
+        ]
+        if jobs:
+            parts[start] = _Part(held, [], len(jobs))
+        yield from jobs
 
 
 def open_campaign(folder: Path, level: float | None = None) -> Campaign:
     """Campaign that a folder holds, of `level` if it holds several."""
-    files = sorted(folder.glob("runs-*.parquet"))
-    if level is not None:
-        files = [path for path in files if path.stem == f"runs-{level:g}"]
-    if len(files) != 1:
-        names = [path.stem.removeprefix("runs-") for path in sorted(folder.glob("runs-*.parquet"))]
+    found = {path.name.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*"))}
+    chosen = [name for name in found if level is None or name == f"{level:g}"]
+    if len(chosen) != 1:
         raise CampaignError(
-            f"{folder} holds {len(files)} campaigns to choose from by --level; "
-            f"there are: {', '.join(names) or 'none'}"
+            f"{folder} holds {len(chosen)} campaigns to choose from by --level; "
+            f"there are: {', '.join(found) or 'none'}"
         )
-    table, description = read_runs(files[0])
-    case = make_case(description["case"], description["parameters"])
-    runs = int(table["run"].max()) + 1 if len(table["run"]) else 0
+    files = part_files(found[chosen[0]])
+    if not files:
+        raise CampaignError(f"{found[chosen[0]]} holds no runs of a campaign")
+    last, description = read_part(files[-1], ["run"])
     return Campaign(
-        case, description["level"], runs, description["seed"], description["random_starts"]
+        make_case(description["case"], description["parameters"]),
+        description["level"],
+        int(last["run"][-1]) + 1,
+        description["seed"],
+        description["random_starts"],
     )
 
 
-def _write(
-    campaign: Campaign, folder: Path, parts: Sequence[dict[str, Array]]
-) -> dict[str, Array]:
-    """Write all parts as one file, sorted by run, whole or not at all; returns its columns."""
-    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    _, order = np.unique(joined["run"], return_index=True)
-    columns = {name: column[order] for name, column in joined.items()}
-    table = pa.table(columns).replace_schema_metadata({"ahv": json.dumps(campaign.describe())})
-    path = campaign_file(campaign, folder)
-    draft = path.with_suffix(f".{os.getpid()}")
-    pq.write_table(table, draft)
-    draft.replace(path)
-    return columns
+def find_run(campaign: Campaign, folder: Path, run: int) -> dict[str, Any] | None:
+    """Row of a run, None if it has not been flown."""
+    path = part_file(level_folder(folder, campaign.level), run - run % PART_RUNS)
+    if not path.exists():
+        return None
+    columns, _ = read_part(path)
+    index = np.flatnonzero(columns["run"] == run)
+    return {name: column[index[0]] for name, column in columns.items()} if len(index) else None
 
 
-def exact_interval(successes: int, runs: int) -> tuple[float, float]:
-    """Clopper-Pearson 95 % interval of a success rate."""
-    interval = binomtest(successes, runs).proportion_ci(method="exact")
-    return float(interval.low), float(interval.high)
-
-
-def summarize_campaign(campaign: Campaign, table: dict[str, Array]) -> dict[str, Any]:
-    """Counts of a campaign, with the bound that no altitude-holding controller beats."""
-    runs = len(table["run"])
-    causes = Counter(Cause(cause).name.lower() for cause in table["cause"].tolist())
-    successes = causes.pop("success", 0)
-    holdable = table["trim_exists"] & (np.abs(table["trim_alpha_deg"]) <= 5.0)
-    return {
-        "controller": campaign.case.name,
-        "level": campaign.level,
-        "runs": runs,
-        "successes": successes,
-        "success_rate": successes / runs,
-        "interval": exact_interval(successes, runs),
-        "failures": dict(causes),
-        "trim_within_5_deg": int(np.sum(holdable)),
-        "failures_without_such_trim": int(np.sum(~holdable & (table["cause"] != 0))),
-    }
+def first_causes(campaign: Campaign, folder: Path, runs: int) -> dict[int, int]:
+    """Causes of failure of the first `runs` runs that were flown, zero for success."""
+    causes: dict[int, int] = {}
+    for part in read_parts(level_folder(folder, campaign.level), ["run", "cause"]):
+        causes |= zip(part["run"].tolist(), part["cause"].tolist(), strict=True)
+        if len(causes) >= runs:
+            break
+    return dict(islice(causes.items(), runs))

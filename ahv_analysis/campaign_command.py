@@ -4,7 +4,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -85,10 +85,11 @@ def fly(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Fly RUNS drawn vehicles a level; a Parquet file a level, with a row a run."""
+    """Fly RUNS drawn vehicles a level; a folder of Parquet files a level, with a row a run."""
     if context.invoked_subcommand is not None:
         return
-    from ahv_analysis.campaign import Campaign, fly_campaign, summarize_campaign
+    from ahv_analysis.campaign import Campaign, fly_campaign
+    from ahv_analysis.campaign_summary import summarize_campaign
     from ahv_analysis.case import load_case
 
     levels = level or [0.3]
@@ -102,21 +103,16 @@ def fly(
         for one in levels:
             campaign = Campaign(case, one, runs, seed, random_starts)
             with progress_bar(f"{case.name} at {one:g}", runs, as_json, unit="runs") as progress:
-                begun: list[int] = []
-
-                def report(done: int, begun: list[int] = begun) -> None:
-                    begun.append(done)
-                    progress(done)
-
+                reported = Reported(progress)
                 started = time.perf_counter()
                 try:
-                    table = fly_campaign(campaign, folder, pool, report)
+                    fly_campaign(campaign, folder, pool, reported)
                 except KeyboardInterrupt:
-                    print_interrupted(begun[-1] if begun else 0, runs)
+                    print_interrupted(reported.last, runs)
                     raise typer.Exit(130) from None
                 wall = time.perf_counter() - started
-            summary = summarize_campaign(campaign, table)
-            steps = float(table["time_s"].sum()) / STEP * (1 - begun[0] / runs)
+            summary = summarize_campaign(campaign, folder)
+            steps = summary["flown_s"] / STEP * (1 - (reported.first or 0) / runs)
             summary |= {"trial_steps_per_second": steps / wall, "wall_s": wall}
             summaries.append(summary | {"out": str(folder)})
     if as_json:
@@ -124,6 +120,21 @@ def fly(
         return
     for summary in summaries:
         _show(summary)
+
+
+class Reported:
+    """Passes progress on, and knows the first and the last of it."""
+
+    def __init__(self, progress: Callable[[int], None]):
+        self._progress = progress
+        self.first: int | None = None
+        self.last = 0
+
+    def __call__(self, done: int) -> None:
+        """Take the number of runs done so far."""
+        self.first = done if self.first is None else self.first
+        self.last = done
+        self._progress(done)
 
 
 def print_interrupted(done: int, runs: int) -> None:
@@ -167,14 +178,13 @@ def rerun(
     import numpy as np
 
     from ahv_analysis.block import fly_alone
-    from ahv_analysis.campaign import campaign_file, flight_columns, open_campaign, read_runs
+    from ahv_analysis.campaign import find_run, flight_columns, open_campaign
     from ahv_analysis.flight import fly_library
     from ahv_analysis.tally import Cause
 
     campaign = open_campaign(folder, level)
-    table, _ = read_runs(campaign_file(campaign, folder))
-    index = np.flatnonzero(table["run"] == run)
-    if not len(index):
+    row = find_run(campaign, folder, run)
+    if row is None:
         raise UsageError(
             f"run {run} is not in {folder}, which holds runs 0 to {campaign.runs - 1}"
         )
@@ -186,7 +196,7 @@ def rerun(
         np.array([case.plant.initial]),
         np.array([tally]),
     )
-    differing = [name for name in alone if alone[name][0] != table[name][index[0]]]
+    differing = [name for name in alone if alone[name][0] != row[name]]
     result = {
         "run": run,
         "cause": Cause(int(tally.cause)).name.lower(),

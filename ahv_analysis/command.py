@@ -232,15 +232,13 @@ def figures(
     3.2-3.7 of a nominal flight; 4.1-4.5 or 5.1-5.5 of an adaptive one, beside the nominal law;
     3.8-3.13, 4.6-4.10 or 5.6-5.10 of a campaign.
     """
-    from ahv_analysis.campaign import campaign_file, open_campaign, read_runs
+    from ahv_analysis.campaign import first_causes, open_campaign
     from ahv_analysis.figures import save_figures
     from ahv_analysis.report_figures import bag_figures, campaign_figures
 
-    if any(source.glob("runs-*.parquet")):
+    if any(source.glob("runs-*")):
         campaign = open_campaign(source, level)
-        found, _ = read_runs(campaign_file(campaign, source))
-        causes = dict(zip(found["run"].tolist(), found["cause"].tolist(), strict=True))
-        plates, draw = campaign_figures(campaign, causes, runs)
+        plates, draw = campaign_figures(campaign, first_causes(campaign, source, runs))
     else:
         plates, draw = bag_figures(source)
     try:

@@ -49,7 +49,7 @@ class Step(NamedTuple):
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the vehicle departs from the model."""
     state, truth, control = case.plant.initial, case.plant.truth, case.control
-    learner = None if control.learner is None else first_learner(state)
+    learner = None if control.learner is None else first_learner(state, control.learner)
     if learner is None:
         commands = nominal_control(state, NEUTRAL, control)
     else:

@@ -21,7 +21,8 @@ def compile_laws() -> None:
     nominal_surfaces(start, still, NEUTRAL, control.inner)
     adaptive_surfaces(start, still, Learned(still, still, still), NEUTRAL, control.inner)
     throttle_command(start, NEUTRAL, control.velocity)
-    learner = next_learner(first_learner(start), start, NEUTRAL, still, start, control.learner)
+    law = control.learner
+    learner = next_learner(first_learner(start, law), start, NEUTRAL, still, start, law)
     disturbance_estimate(learner, still)
     vehicle_step(start, NEUTRAL, 0.2, 0.0, truth)
     departure_reason(start, truth.geometric, 0.0)

@@ -55,16 +55,15 @@ def _fly(case: Case) -> FlightRecord:
 
 
 def campaign_figures(
-    campaign: Campaign, causes: Mapping[int, int], runs: int
+    campaign: Campaign, causes: Mapping[int, int]
 ) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
-    """Which figures a campaign is for, and how to draw one with the first `runs` of its runs.
+    """Which figures a campaign is for, and how to draw one with some of its runs.
 
-    `causes` has the cause of failure of every run flown, zero for success. The runs are flown
+    `causes` has the cause of failure of each run to draw, zero for success. The runs are flown
     again, so that a campaign of any size keeps no trajectory.
     """
-    drawn = sorted(causes)[:runs]
-    flights = [fly_trajectory(campaign.case_of(run), DRAWN_EVERY) for run in drawn]
-    failed = [causes[run] != 0 for run in drawn]
+    flights = [fly_trajectory(campaign.case_of(run), DRAWN_EVERY) for run in causes]
+    failed = [cause != 0 for cause in causes.values()]
     control = campaign.case.control
     if control.learner is None:
         plates = CAMPAIGN_3

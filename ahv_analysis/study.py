@@ -97,7 +97,7 @@ def fly_study(
     state: State, settings: FlightControl, truth: Truth, explicit: bool, steps: int
 ) -> tuple[int, float, float, float]:
     """Fly until the end or the loss of the vehicle; sums for `Outcome`."""
-    learner = first_learner(state)
+    learner = first_learner(state, settings.learner)
     answer = adaptive_control(state, learner, NEUTRAL, settings)
     largest, follow, rough = 0.0, 0.0, 0.0
     for step in range(steps):

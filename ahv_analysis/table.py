@@ -5,7 +5,8 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ahv_analysis.campaign import Campaign, exact_interval, fly_campaign, summarize_campaign
+from ahv_analysis.campaign import Campaign, fly_campaign
+from ahv_analysis.campaign_summary import exact_interval, summarize_campaign
 from ahv_analysis.case import load_case
 
 
@@ -57,7 +58,7 @@ def fly_table(
         case = load_case(controller + ("_protected" if protected else ""))
         for reported in REPORT:
             campaign = Campaign(case, reported.level, runs or reported.trials, seed)
-            table = fly_campaign(
+            fly_campaign(
                 campaign,
                 folder / case.name,
                 executor,
@@ -70,7 +71,7 @@ def fly_table(
                     reported.trials,
                     successes,
                     exact_interval(successes, reported.trials),
-                    summarize_campaign(campaign, table),
+                    summarize_campaign(campaign, folder / case.name),
                 )
             )
     return rows

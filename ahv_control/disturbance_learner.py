@@ -26,6 +26,7 @@ class LearnerSettings(NamedTuple):
     gamma: float  # [deg^2/s^4] learning rate, eq 4.11
     theta: float  # [s^2] weight of the Jacobian's error, Theta = theta I, eq 4.11
     geometric: bool  # h is a geometric altitude
+    first_estimate: float = 0.0  # [deg/s^2] d-hat of the pitch channel before any measurement
 
 
 class Basis(NamedTuple):
@@ -189,10 +190,15 @@ def disturbance_estimate(learner: LearnerState, rates: Rates) -> Rates:
 
 
 @elementwise
-def start_learner(rates: Rates) -> LearnerState:
-    """Learner that has seen nothing but the first rates [rad/s]."""
+def start_learner(rates: Rates, first_estimate: float = 0.0) -> LearnerState:
+    """Learner that has seen nothing but the first rates [rad/s].
+
+    It assumes the pitch disturbance `first_estimate` [deg/s^2] until it has learned better; a
+    positive one is nose up. docs/adaptive_control.md says what that is for.
+    """
     none = Basis(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return LearnerState(rates, rates, none, none, none)
+    pitch = Basis(first_estimate, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return LearnerState(rates, rates, none, pitch, none)
 
 
 @elementwise

@@ -45,7 +45,9 @@ class DisturbanceLearnerNode(BaseNode):
         """Make the law."""
         self._law = learner_settings(settings)
         still, start = Rates(0.0, 0.0, 0.0), DEFAULT_START  # compiled before it flies
-        learner = next_learner(first_learner(start), start, NEUTRAL, still, start, self._law)
+        learner = next_learner(
+            first_learner(start, self._law), start, NEUTRAL, still, start, self._law
+        )
         disturbance_estimate(learner, still)
 
     def start(self) -> None:
@@ -68,7 +70,7 @@ class DisturbanceLearnerNode(BaseNode):
         """File a state twice: as the end of the step before, and as the start of its own."""
         if self._learner is None:
             state = State(*values)
-            self._publish(stamp, state, first_learner(state))
+            self._publish(stamp, state, first_learner(state, self._law))
         else:
             self._put("now", stamp - STEP_NS, values)
         self._put("before", stamp, values)
@@ -107,7 +109,7 @@ class DisturbanceLearnerNode(BaseNode):
     def _anew(self, state: State) -> LearnerState:
         """Observer at the state, with the weights so far."""
         assert self._learner is not None
-        start = first_learner(state)
+        start = first_learner(state, self._law)
         return self._learner._replace(X_a=start.X_a, X_d=start.X_d)
 
     def _publish(self, stamp: int, state: State, learner: LearnerState) -> None:

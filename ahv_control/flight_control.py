@@ -66,9 +66,9 @@ def adaptive_control(
 
 
 @elementwise
-def first_learner(state: State) -> LearnerState:
+def first_learner(state: State, settings: LearnerSettings) -> LearnerState:
     """Learner for the first `state` of a flight."""
-    return start_learner(Rates(state.P, state.Q, state.R))
+    return start_learner(Rates(state.P, state.Q, state.R), settings.first_estimate)
 
 
 @elementwise

@@ -75,6 +75,14 @@ LEARNER_PARAMETERS = (
     Parameter("k_b", 0.7, "bound on the observer error, eq 4.11", "deg/s", 0.01, 100.0),
     Parameter("gamma", 40.0, "learning rate, eq 4.11", "deg^2/s^4", 0.1, 1e4),
     Parameter("theta", 0.01, "weight of the Jacobian's error, eq 4.11", "s^2", 0.0, 1e3),
+    Parameter(
+        "first_estimate",
+        0.0,
+        "pitch disturbance assumed before the first measurement, nose up positive",
+        "deg/s^2",
+        -100.0,
+        100.0,
+    ),
     GEOMETRIC_ALTITUDE,
 )
 VELOCITY_PARAMETERS = (
@@ -127,6 +135,7 @@ def learner_settings(values: Values) -> LearnerSettings:
         float(values["gamma"]),
         float(values["theta"]),
         bool(values["geometric_altitude"]),
+        float(values["first_estimate"]),
     )
 
 

@@ -66,7 +66,7 @@ def number(value):
 
 case = load_case("neuro_adaptive_sc_gdi")
 state, truth, control = number(case.plant.initial), number(case.plant.truth), number(case.control)
-learner = first_learner(state)
+learner = first_learner(state, control.learner)
 answer = adaptive_control(state, learner, number(NEUTRAL), control)
 counts.update(dict.fromkeys(counts, 0))
 later = vehicle_step(state, answer.surfaces, answer.throttle, 0.0, truth)

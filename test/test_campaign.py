@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -18,13 +19,12 @@ from scipy.stats import beta
 from ahv_analysis.block import fly_alone
 from ahv_analysis.campaign import (
     Campaign,
-    campaign_file,
-    exact_interval,
+    first_causes,
     fly_campaign,
     open_campaign,
-    read_runs,
-    summarize_campaign,
 )
+from ahv_analysis.campaign_store import PART_RUNS, level_folder, part_files
+from ahv_analysis.campaign_summary import exact_interval, summarize_campaign
 from ahv_analysis.case import load_case
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.report_figures import campaign_figures
@@ -38,8 +38,20 @@ def campaign(name="neuro_adaptive_di", level=0.4, runs=RUNS, seed=2, random_star
     return Campaign(load_case(name, {"duration": 20.0}), level, runs, seed, random_starts)
 
 
+def rows(folder, level=0.4):
+    """All rows that a campaign keeps, as anybody would read them."""
+    table = pq.read_table(level_folder(folder, level))
+    return {name: table[name].to_numpy() for name in table.column_names}
+
+
 def same(one, other):
     return one.keys() == other.keys() and all(np.array_equal(one[key], other[key]) for key in one)
+
+
+def done(result):
+    future: Future = Future()
+    future.set_result(result)
+    return future
 
 
 @pytest.fixture(scope="module")
@@ -47,17 +59,14 @@ def flown(tmp_path_factory):
     """A campaign of short flights and its folder."""
     folder = tmp_path_factory.mktemp("campaign")
     with ThreadPoolExecutor(2) as pool:
-        return fly_campaign(campaign(), folder, pool), folder
+        fly_campaign(campaign(), folder, pool)
+    return rows(folder), folder
 
 
 def test_a_row_a_run(flown):
-    table, folder = flown
+    table, _ = flown
     assert table["run"].tolist() == list(range(RUNS))
-    file = pq.read_table(campaign_file(campaign(), folder))
-    assert file.num_rows == RUNS
-    assert {"CL", "Izz", "cause", "time_s", "max_abs_alpha_deg", "trim_exists"} <= set(
-        file.column_names
-    )
+    assert {"CL", "Izz", "cause", "time_s", "max_abs_alpha_deg", "trim_exists"} <= table.keys()
     assert np.all(table["alpha_margin_deg"] == 5.0 - table["max_abs_alpha_deg"])
     failed = table["cause"] != 0
     assert 0 < failed.sum() < RUNS // 2
@@ -80,8 +89,8 @@ def test_order_of_execution_changes_nothing(flown, tmp_path):
                     waiting.set_result(work(*given))
             return future
 
-    table, _ = flown
-    assert same(fly_campaign(campaign(), tmp_path, Backwards()), table)
+    fly_campaign(campaign(), tmp_path, Backwards())
+    assert same(rows(tmp_path), flown[0])
 
 
 def test_an_interrupted_campaign_resumes(flown, tmp_path):
@@ -89,30 +98,89 @@ def test_an_interrupted_campaign_resumes(flown, tmp_path):
         """An executor that is interrupted in its second job."""
 
         def submit(self, function, campaign, first, count):
+            if first < 64:
+                return done(function(campaign, first, count))
             future: Future = Future()
-            if first >= 64:
-                future.set_exception(KeyboardInterrupt())
-            else:
-                future.set_result(function(campaign, first, count))
+            future.set_exception(KeyboardInterrupt())
             return future
 
     with pytest.raises(KeyboardInterrupt):
         fly_campaign(campaign(), tmp_path, Interrupted())
-    kept, _ = read_runs(campaign_file(campaign(), tmp_path))
+    assert rows(tmp_path)["run"].tolist() == list(range(64))
     begun = []
     with ThreadPoolExecutor(2) as pool:
-        table = fly_campaign(campaign(), tmp_path, pool, begun.append)
-    assert begun[0] == len(kept["run"]) and begun[-1] == RUNS
-    assert same(table, flown[0])
+        fly_campaign(campaign(), tmp_path, pool, begun.append)
+    assert begun[0] == 64 and begun[-1] == RUNS
+    assert same(rows(tmp_path), flown[0])
 
 
 def test_more_runs_add_to_a_campaign_and_fewer_are_a_part_of_it(flown, tmp_path):
     with ThreadPoolExecutor(2) as pool:
         fly_campaign(campaign(runs=70), tmp_path, pool)
-        assert same(fly_campaign(campaign(), tmp_path, pool), flown[0])
-        part = fly_campaign(campaign(runs=10), tmp_path, pool)
-    assert part["run"].tolist() == list(range(10))
-    assert pq.read_table(campaign_file(campaign(), tmp_path)).num_rows == RUNS
+        fly_campaign(campaign(), tmp_path, pool)
+        assert same(rows(tmp_path), flown[0])
+        begun = []
+        fly_campaign(campaign(runs=10), tmp_path, pool, begun.append)
+    assert begun == [10]
+    assert summarize_campaign(campaign(runs=10), tmp_path)["runs"] == 10
+    assert same(rows(tmp_path), flown[0])
+
+
+class Invented:
+    """An executor that makes up the results of long campaigns instead of flying them."""
+
+    def __init__(self, pattern):
+        self.pattern = pattern
+
+    def submit(self, function, campaign, first, count):
+        chosen = np.arange(first, first + count) % len(self.pattern["run"])
+        columns = {name: column[chosen] for name, column in self.pattern.items()}
+        return done(columns | {"run": np.arange(first, first + count)})
+
+
+def test_memory_does_not_grow_with_the_campaign(flown, tmp_path):
+    """Peak of flying, resuming and summing up, with numpy's and Arrow's allocations."""
+
+    def peak(parts):
+        long = campaign(runs=parts * PART_RUNS)
+        folder = tmp_path / str(parts)
+        tracemalloc.start()
+        try:
+            fly_campaign(long, folder, Invented(flown[0]))
+            fly_campaign(long, folder, Invented(flown[0]))
+            assert summarize_campaign(long, folder)["runs"] == parts * PART_RUNS
+            return tracemalloc.get_traced_memory()[1] + pa.total_allocated_bytes()
+        finally:
+            tracemalloc.stop()
+
+    peak(1)  # what is loaded once
+    few, many = peak(4), peak(16)
+    assert many - few < 1.0 * 12 * PART_RUNS  # less than a byte a run
+
+
+def test_a_long_campaign_is_one_table_of_parts(flown, tmp_path):
+    class Interrupted(Invented):
+        """Stops in the second part."""
+
+        def submit(self, function, campaign, first, count):
+            if first == PART_RUNS + 640:
+                raise KeyboardInterrupt
+            return super().submit(function, campaign, first, count)
+
+    long = campaign(runs=2 * PART_RUNS + 100)
+    with pytest.raises(KeyboardInterrupt):
+        fly_campaign(long, tmp_path, Interrupted(flown[0]))
+    kept = len(rows(tmp_path)["run"])
+    assert 0 < kept < long.runs
+    begun = []
+    fly_campaign(long, tmp_path, Invented(flown[0]), begun.append)
+    assert begun[0] == kept and begun[-1] == long.runs
+    assert rows(tmp_path)["run"].tolist() == list(range(long.runs))
+    assert len(part_files(level_folder(tmp_path, 0.4))) == 3
+    assert open_campaign(tmp_path) == long
+    causes = first_causes(long, tmp_path, PART_RUNS + 5)
+    assert list(causes) == list(range(PART_RUNS + 5))
+    assert [causes[run] for run in range(RUNS)] == flown[0]["cause"].tolist()
 
 
 @pytest.mark.parametrize("change", [{"seed": 3}, {"name": "neuro_adaptive_sc_gdi"}])
@@ -123,10 +191,8 @@ def test_another_campaign_is_not_mixed_in(flown, change):
 
 
 def test_a_folder_gives_its_campaign_back(flown):
-    table, folder = flown
-    found = open_campaign(folder)
-    assert found == campaign()
-    assert same(read_runs(campaign_file(found, folder))[0], table)
+    _, folder = flown
+    assert open_campaign(folder) == campaign()
     with pytest.raises(CampaignError, match=r"choose from by --level; there are: 0\.4"):
         open_campaign(folder, 0.3)
     with pytest.raises(CampaignError, match="none"):
@@ -150,7 +216,8 @@ def test_a_campaign_flies_the_disturbance_of_its_case(tmp_path):
     push = {"duration": 2.0, "disturbance.P.constant": 2.0, "disturbance.R.amplitude": 1.0}
     pushed = Campaign(load_case("neuro_adaptive_di", push), 0.2, 20, 1)
     with ThreadPoolExecutor(1) as pool:
-        table = fly_campaign(pushed, tmp_path, pool)
+        fly_campaign(pushed, tmp_path, pool)
+    table = rows(tmp_path, 0.2)
     assert np.all(table["max_abs_phi_deg"] > 1e-3)
     one = pushed.case_of(7)
     alone = fly_alone(one.plant.initial, one.plant.truth, one.control, one.plant.steps)
@@ -159,8 +226,8 @@ def test_a_campaign_flies_the_disturbance_of_its_case(tmp_path):
 
 def test_figures_of_a_campaign_with_gaps_mark_the_runs_that_failed():
     causes = {run: int(run == 70) for run in range(64, 80)}
-    _, draw = campaign_figures(campaign(), causes, 10)
-    assert draw.keywords["failed"] == [run == 70 for run in range(64, 74)]
+    _, draw = campaign_figures(campaign(), causes)
+    assert draw.keywords["failed"] == [run == 70 for run in range(64, 80)]
     start = campaign().case_of(64)
     assert np.array_equal(draw.keywords["flights"][0].states[0], start.plant.initial)
 
@@ -184,9 +251,16 @@ def damaged(path, kind):
     "kind", ["no parquet", "a folder", "no description", "bad description", "no runs"]
 )
 def test_a_damaged_campaign_is_named(tmp_path, kind):
-    path = tmp_path / "runs-0.3.parquet"
+    path = tmp_path / "runs-0.3" / "part-000000000.parquet"
+    path.parent.mkdir()
     damaged(path, kind)
-    with pytest.raises(CampaignError, match=r"runs-0\.3\.parquet is not the file of a campaign"):
+    with pytest.raises(CampaignError, match=r"part-0+\.parquet is not the file of a campaign"):
+        open_campaign(tmp_path)
+
+
+def test_a_level_without_runs_is_named(tmp_path):
+    (tmp_path / "runs-0.3").mkdir()
+    with pytest.raises(CampaignError, match=r"runs-0\.3 holds no runs of a campaign"):
         open_campaign(tmp_path)
 
 
@@ -202,8 +276,10 @@ def test_intervals_are_exact(successes, runs):
 
 
 def test_the_summary_counts(flown):
-    table, _ = flown
-    summary = summarize_campaign(campaign(), table)
+    table, folder = flown
+    summary = summarize_campaign(campaign(), folder)
+    assert summary["successes"] == np.sum(table["cause"] == 0)
+    assert summary["flown_s"] == pytest.approx(np.sum(table["time_s"]))
     assert summary["runs"] == RUNS == summary["successes"] + sum(summary["failures"].values())
     assert summary["success_rate"] == summary["successes"] / RUNS
     low, high = summary["interval"]
@@ -242,9 +318,9 @@ def test_dask_flies_the_same_campaign_and_outlives_a_worker(flown, tmp_path):
                 killed.append(victim.pid)
                 victim.process.process._process.kill()
 
-        table = fly_campaign(campaign(), tmp_path, pool, kill)
+        fly_campaign(campaign(), tmp_path, pool, kill)
     assert killed
-    assert same(table, flown[0])
+    assert same(rows(tmp_path), flown[0])
 
 
 def test_the_command_flies_reruns_and_draws(tmp_path):
@@ -288,15 +364,15 @@ def test_ctrl_c_keeps_what_was_flown(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     )
-    file = out / "runs-0.3.parquet"
     deadline = time.monotonic() + 60
-    while not file.exists() and time.monotonic() < deadline:
+    while not (out / "runs-0.3").exists() and time.monotonic() < deadline:
         time.sleep(0.1)
+    time.sleep(3.0)  # some jobs
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "resumes" in errors and "Traceback" not in errors
-    assert pq.read_table(file).num_rows >= 64
+    assert len(rows(out, 0.3)["run"]) >= 64
 
 
 @pytest.mark.parametrize(

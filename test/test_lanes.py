@@ -43,7 +43,7 @@ SEED = 5
 def last_of_flight(state, truth, control, steps):
     """State and learner at the end of an adaptive flight; the numbers may be lanes."""
     one = state.u
-    learner = widen(first_learner(state), one)
+    learner = widen(first_learner(state, control.learner), one)
     answer = widen(adaptive_control(state, learner, NEUTRAL, control), one)
     for step in range(steps):
         later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)

@@ -144,7 +144,9 @@ def test_an_interrupted_recording_is_not_taken_for_a_departure(tmp_path):
     for step, _ in zip(fly(case), range(51), strict=False):
         write_step(bag, step)
     bag.close()
-    assert why_ended_early(read_bag(tmp_path / "bag"), case) == "the recording stops at 0.5 s of 2 s"
+    assert (
+        why_ended_early(read_bag(tmp_path / "bag"), case) == "the recording stops at 0.5 s of 2 s"
+    )
 
 
 def test_numbers_are_written_to_be_read():
