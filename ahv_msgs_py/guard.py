@@ -9,7 +9,7 @@ from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.topics import LoopTopic
 
 Values = tuple[float, ...]
-REACH = 1000  # messages of a publisher that may be lost in a row, and it is still known as itself
+REACH = 3  # numbers by which a publisher may be ahead of one message a step
 
 
 class Refusal(Exception):
@@ -26,7 +26,7 @@ class Guard:
 
     A message does not say who sent it. The middleware numbers the messages of every publisher from
     1 on, and that tells one from another: the publisher whose message was accepted first is obeyed
-    as long as its numbers go on. Another one is refused until the first has been silent for
+    as long as its numbers go on, by one or so a step. Another one is refused until the first has been silent for
     `SILENCE` of real time; in lockstep, where silence means nothing, until it is the only one.
     """
 
@@ -59,14 +59,15 @@ class Guard:
 
         `sequence` is its number at its publisher, `now` the stamp of the newest state, if known.
         """
-        last = self._sequence
-        same_voice = last is not None and 0 < sequence - last <= REACH
-        if same_voice:
-            self._sequence = sequence
+        ahead = 1 if self._sequence is None else sequence - self._sequence
+        same_voice = 0 < ahead <= REACH
+        if same_voice and self._sequence is not None:
+            self._sequence = sequence  # though the message may yet be refused
         stamp, values = self._judge(data)
         if self._realtime and now is not None:
             self._check_age(stamp, now)
-        if not same_voice and last is not None:
+        missed = (stamp - self._stamp) // PERIOD  # steps of which nothing came
+        if not (same_voice or 0 < ahead <= REACH + missed):
             self._check_takeover()
         if stamp <= self._stamp:
             known = f"stamp {stamp / 1e9:g} s after {self._stamp / 1e9:g} s"

@@ -1,0 +1,195 @@
+"""A guard lets one voice through, in order, with values that can be; all else it names."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ahv_msgs_py.faults import HOLD, PERIOD, SILENCE, STALE, Fault, fault_rows
+from ahv_msgs_py.guard import Guard, Refusal
+from ahv_msgs_py.layout import MessageError, NamedVector
+from ahv_msgs_py.stepwise import RealTimeSteps
+from ahv_msgs_py.topics import SURFACE_COMMAND
+
+VALUES = (-0.1, -0.1, 0.0)
+LAYOUT = SURFACE_COMMAND.layout
+
+
+class Air:
+    """What surrounds a guard: a clock that stands still unless moved, and other publishers."""
+
+    def __init__(self, realtime=True):
+        self.time = 0
+        self.publishers = 1
+        self.guard = Guard(
+            SURFACE_COMMAND, self.general, lambda: self.time, realtime, lambda: self.publishers
+        )
+
+    @staticmethod
+    def general(data):
+        raise MessageError("not of this layout")
+
+    def say(self, step, sequence, values=VALUES, now=None):
+        """Send the command of a step; returns the fault that it was refused for, or None."""
+        data = LAYOUT.encode(step * PERIOD, values)
+        try:
+            self.guard.read(data, sequence, None if now is None else now * PERIOD)
+        except Refusal as refusal:
+            return refusal.fault
+        return None
+
+
+def test_messages_in_order_are_obeyed():
+    air = Air()
+    assert [air.say(step, step + 1) for step in range(50)] == [None] * 50
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_numbers_that_are_none_are_refused(value, place):
+    values = [*VALUES]
+    values[place] = value
+    assert Air().say(0, 1, values) == Fault.NOT_FINITE
+
+
+def test_a_deflection_beyond_the_stops_is_refused():
+    assert Air().say(0, 1, (0.0, -2.0, 0.0)) == Fault.OUT_OF_RANGE
+
+
+def test_repeated_and_late_messages_are_refused():
+    air = Air()
+    assert air.say(5, 1) is None
+    assert air.say(5, 2) == Fault.DUPLICATE
+    assert air.say(4, 3) == Fault.OUT_OF_ORDER
+    assert air.say(6, 4) is None
+
+
+def test_stamps_far_from_the_newest_state_are_refused_in_real_time():
+    limit = STALE // PERIOD
+    assert Air().say(100, 1, now=100 + limit) is None
+    assert Air().say(100, 1, now=100 + limit + 1) == Fault.STALE
+    assert Air().say(100, 1, now=100 - limit) is None
+    assert Air().say(100, 1, now=100 - limit - 1) == Fault.WRONG_STAMP
+    assert Air(realtime=False).say(100, 1, now=0) is None  # in lockstep history comes late
+
+
+def test_a_stamp_between_two_steps_is_refused():
+    guard = Air().guard
+    with pytest.raises(Refusal) as refusal:
+        guard.read(LAYOUT.encode(3, VALUES), 1, None)
+    assert refusal.value.fault == Fault.WRONG_STAMP
+
+
+def test_other_bytes_are_refused():
+    foreign = NamedVector(LAYOUT.frame, ["one", "two", "three"]).encode(0, VALUES)
+    with pytest.raises(Refusal) as refusal:
+        Air().guard.read(foreign, 1, None)
+    assert refusal.value.fault == Fault.MALFORMED
+
+
+@given(st.integers(1, 400))
+def test_a_second_publisher_is_never_obeyed_while_the_first_speaks(steps):
+    air = Air()
+    for step in range(200):
+        air.time += PERIOD
+        assert air.say(step, 5000 + step, now=step) is None
+        assert air.say(step + 1, 1 + step * steps % 4000, now=step) == Fault.SECOND_PUBLISHER
+
+
+def test_another_publisher_takes_over_after_a_silence():
+    air = Air()
+    assert air.say(0, 500, now=0) is None
+    air.time = SILENCE
+    assert air.say(10, 1, now=10) == Fault.SECOND_PUBLISHER
+    air.time = SILENCE + 1
+    assert air.say(11, 2, now=11) is None
+    assert air.say(12, 501, now=12) == Fault.SECOND_PUBLISHER  # the first one has lost its turn
+
+
+def test_in_lockstep_another_publisher_takes_over_when_it_is_alone():
+    air = Air(realtime=False)
+    assert air.say(0, 500) is None
+    air.time, air.publishers = 100 * SILENCE, 2
+    assert air.say(1, 1) == Fault.SECOND_PUBLISHER
+    air.publishers = 1
+    assert air.say(1, 2) is None
+
+
+def test_a_publisher_of_which_much_was_lost_is_still_itself():
+    air = Air()
+    assert air.say(0, 1, now=0) is None
+    assert air.say(90, 91, now=90) is None
+
+
+class Steps:
+    """Real-time steps with two inputs beside the state, and what came of them."""
+
+    def __init__(self, wait=True):
+        self.answers = []
+        self.missing = []
+        self.steps = RealTimeSteps(
+            ("state", "a", "b"),
+            lambda stamp, *values: self.answers.append((stamp // PERIOD, *values)),
+            {"a": lambda last, age: ("a held", last, age), "b": lambda last, age: None},
+            lambda stamp, name: self.missing.append((stamp // PERIOD, name)),
+            wait,
+        )
+
+    def put(self, *names, step):
+        for name in names:
+            self.steps.put(name, step * PERIOD, (name, step))
+
+
+def test_a_step_is_answered_when_its_inputs_are_there():
+    steps = Steps()
+    steps.put("a", "state", "b", step=0)
+    steps.put("state", "b", "a", step=1)
+    state = ("state", 0), ("a", 0), ("b", 0)
+    assert steps.answers == [(0, *state), (1, ("state", 1), ("a", 1), ("b", 1))]
+    assert steps.missing == []
+
+
+def test_a_lost_input_costs_one_step_and_is_waited_for_again_when_it_is_in_time():
+    steps = Steps()
+    steps.put("state", "a", "b", step=0)
+    steps.put("state", "b", step=1)  # a has died
+    steps.put("state", "b", step=2)
+    assert steps.answers[1:] == [(2, ("state", 2), ("a held", ("a", 0), 2), ("b", 2))]
+    steps.put("a", step=1)  # too late to be waited for
+    steps.put("state", "b", step=3)
+    assert steps.answers[2:] == [(3, ("state", 3), ("a held", ("a", 1), 2), ("b", 3))]
+    steps.put("a", step=3)
+    steps.put("state", "b", step=4)
+    assert len(steps.answers) == 3
+    steps.put("a", step=4)
+    assert steps.answers[3:] == [(4, ("state", 4), ("a", 4), ("b", 4))]
+
+
+def test_an_input_that_never_came_has_no_last_values():
+    steps = Steps()
+    steps.put("state", "b", step=0)
+    steps.put("state", "b", step=1)
+    assert steps.answers == [(1, ("state", 1), ("a held", None, 0), ("b", 1))]
+
+
+def test_without_waiting_a_step_is_answered_with_what_is_there():
+    steps = Steps(wait=False)
+    steps.put("a", "state", step=0)
+    steps.put("a", "b", "state", step=1)
+    assert steps.answers == [
+        (0, ("state", 0), ("a", 0), None),
+        (1, ("state", 1), ("a", 1), ("b", 1)),
+    ]
+    assert steps.missing == [(0, "b")]
+
+
+def test_limits_are_in_the_order_that_the_responses_say():
+    assert PERIOD < STALE <= HOLD
+
+
+def test_every_fault_says_who_notices_what_is_done_and_when():
+    rows = fault_rows()
+    assert len({row[0] for row in rows}) == len(rows)
+    for row in rows:
+        assert all(row), row
