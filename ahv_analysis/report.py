@@ -5,19 +5,12 @@ from typing import Annotated
 
 import typer
 
-from ahv_analysis.console import (
-    Json,
-    UsageError,
-    console,
-    one_sentence,
-    print_json,
-    progress_bar,
-)
+from ahv_analysis.console import Json, UsageError, one_sentence, print_json, progress_bar
 
 
 @one_sentence
 def report(
-    bags: Annotated[list[Path], typer.Argument(help="Folders of bags.", metavar="BAG...")],
+    bags: Annotated[list[Path], typer.Argument(help="Folders of bags.", metavar="BAG")],
     out: Annotated[Path, typer.Option(help="Folder for the pages.")],
     as_json: Json = False,
 ) -> None:
@@ -68,6 +61,6 @@ def report(
         )
         return
     for flight, file in zip(flights, files, strict=False):
-        console.print(f"{file}: {flight.verdict.word}, {flight.verdict.reason}")
+        print(f"{file}: {flight.verdict.word}, {flight.verdict.reason}")
     if len(flights) > 1:
-        console.print(f"{files[-1]}: all of them overlaid")
+        print(f"{files[-1]}: all of them overlaid")

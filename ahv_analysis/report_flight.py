@@ -75,6 +75,8 @@ def read_flights(bags: Sequence[Path]) -> list[Flight]:
 
 def _read(bag: Path, name: str) -> Flight:
     record, notes = read_bag(bag), read_notes(bag) or {}
+    if record.steps < 1:
+        raise BagError(f"{bag} holds no two steps with all their messages: there was no flight")
     case = make_case(notes["case"], notes["parameters"]) if notes else None
     return Flight(name, bag, record, notes, case, measure(record, case.control if case else None))
 

@@ -31,7 +31,7 @@ from ahv_analysis.metrics import (
 )
 from ahv_analysis.record import record
 from ahv_analysis.report_flight import page_names, read_flights
-from ahv_analysis.report_page import number
+from ahv_analysis.report_page import number, render
 from ahv_analysis.summary import summarize
 from ahv_plant.constants import RADIANS
 
@@ -289,9 +289,14 @@ def test_a_bag_without_notes_has_a_page_that_says_so(tmp_path):
     (flight,) = read_flights([tmp_path / "bag"])
     assert flight.verdict.word == "open"
     assert "altitude" not in flight.metrics["tracking"]
-    assert ahv("report", tmp_path / "bag", "--out", tmp_path / "pages").exit_code == 0
-    (page,) = (tmp_path / "pages").glob("*.html")
-    assert "the bag has no notes" in page.read_text()
+    assert "the bag has no notes" in render([flight])
+
+
+def a_single_step(folder):
+    bag = BagWriter(folder / "single")
+    write_step(bag, next(fly(short("neuro_adaptive_di"))))
+    bag.close()
+    return folder / "single"
 
 
 def cut(bag, folder):
@@ -306,6 +311,7 @@ def cut(bag, folder):
     [
         (lambda bag, tmp: [tmp / "none", "--out", tmp / "o"], "none is not a bag"),
         (lambda bag, tmp: [cut(bag, tmp), "--out", tmp / "o"], "cut cannot be read as a bag"),
+        (lambda bag, tmp: [a_single_step(tmp), "--out", tmp / "o"], "holds no two steps"),
         (lambda bag, tmp: [bag, bag, "--out", tmp / "o"], "is given 2 times"),
         (lambda bag, tmp: [bag, "--out", bag / "metadata.yaml"], "cannot write pages to"),
         (lambda bag, tmp: [bag, "--out", bag.parent.parent / "p"], "lost.html exists already"),
