@@ -39,13 +39,15 @@ setup(
         "numpy",  # arrays of flights
         "scipy",  # trim solver, rotations
         "numba>=0.60",  # the vehicle and the laws at machine speed
-        "rosbags>=0.11",  # MCAP bags without a ROS installation
+        "mcap",  # records of MCAP files; brings zstandard and lz4, which compress their chunks
+        "rosbags>=0.11",  # message definitions and quality of service, without a ROS installation
         "matplotlib",  # figures
         "jinja2",  # pages of `ahv report`
         "typer",  # the `ahv` command
         "rich",  # its tables and progress bars
         "pyyaml",  # case files
-        "pyarrow",  # campaigns as Parquet files
+        "pyarrow",  # campaigns as Parquet files, flights as CSV and Parquet
+        "xarray",  # flights as labelled arrays; writes netCDF by scipy, so no netCDF library
     ],
     extras_require={
         # ROS itself where there is no ROS installation; a ROS machine brings its own
@@ -57,7 +59,6 @@ setup(
             "pytest",
             "coverage",
             "hypothesis",
-            "mcap",
             "mcap-ros2-support",
             "mpmath",
             "catkin_pkg",  # what ROS itself reads package.xml with

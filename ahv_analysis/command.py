@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ahv_analysis.bag_command import bag
 from ahv_analysis.campaign_command import monte_carlo, table
 from ahv_analysis.console import (
     HIGHEST_LEVEL,
@@ -38,6 +39,7 @@ app = typer.Typer(
 )
 app.add_typer(monte_carlo, name="monte-carlo")
 app.add_typer(faults, name="faults")
+app.add_typer(bag, name="bag")
 app.command()(table)
 app.command()(report)
 

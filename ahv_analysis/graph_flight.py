@@ -12,7 +12,7 @@ from ahv_analysis.case import Case, notes
 from ahv_analysis.errors import GraphError
 from ahv_analysis.flight import fly
 from ahv_analysis.process_flight import controllers, node_class
-from ahv_analysis.recorder_node import RecorderNode
+from ahv_analysis.recorder_node import STOP, RecorderNode
 from ahv_msgs_py.base_node import REALTIME, BaseNode
 from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
@@ -32,25 +32,28 @@ def fly_graph(
     *,
     domain: int | None = None,
     realtime: bool = False,
+    on_error: str = STOP,
     progress: Callable[[int], None] = lambda steps: None,
 ) -> tuple[str, float]:
     """Fly `case` on a graph of its own context; record to `bag` unless that is None.
 
     In lockstep, or with `realtime` at 100 Hz by the wall clock. `progress(steps)` is called now
-    and then. Returns why the flight ended early (empty if it did
-    not) and the seconds from the first state to the last command. Raises ParameterError for
-    settings that a node refuses and GraphError if the graph stops.
+    and then. Returns why the flight ended early (empty if it did not) and the seconds from the
+    first state to the last command. Raises ParameterError for settings that a node refuses,
+    GraphError if the graph stops and BagError if the disk fails; with `on_error` CONTINUE the
+    flight goes on without a record then.
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=domain)
     executor = EventsExecutor(context=context)
     nodes: list[BaseNode] = []
+    recorder = None
     mode = {REALTIME.name: realtime}
     try:
-        recorder = None
         if bag is not None:
-            recorder = RecorderNode({"bag": str(bag), "notes": notes(case)} | mode, context)
+            settings = {"bag": str(bag), "notes": notes(case), "on_error": on_error} | mode
+            recorder = RecorderNode(settings, context)
             nodes.append(recorder)
         nodes += [
             node_class(name)(case.parameters[name] | mode, context) for name in controllers(case)
@@ -64,7 +67,7 @@ def fly_graph(
             node.bring_up()
             executor.add_node(node)
         started = time.perf_counter()
-        _spin(executor, plant, progress)
+        _spin(executor, plant, recorder, progress)
         wall = time.perf_counter() - started
         if plant.count_publishers(STATE.name) > 1:
             raise GraphError(
@@ -72,7 +75,6 @@ def fly_graph(
             )
         if recorder is not None:
             _drain(executor, recorder, loop_topics(case), plant.step)
-        return plant.finished.result(), wall
     finally:
         for node in nodes:
             executor.remove_node(node)
@@ -80,14 +82,24 @@ def fly_graph(
         for node in reversed(nodes):
             node.destroy_node()
         rclpy.shutdown(context=context)
+    if recorder is not None and recorder.failure is not None and on_error == STOP:
+        raise recorder.failure
+    return plant.finished.result(), wall
 
 
-def _spin(executor: EventsExecutor, plant: PlantNode, progress: Callable[[int], None]) -> None:
-    """Run the graph until the flight is over."""
+def _spin(
+    executor: EventsExecutor,
+    plant: PlantNode,
+    recorder: RecorderNode | None,
+    progress: Callable[[int], None],
+) -> None:
+    """Run the graph until the flight is over, or until the recorder gives it up."""
     last, since = -1, time.monotonic()
     while not plant.finished.done():
         executor.spin_until_future_complete(plant.finished, LOOK)
         progress(plant.step)
+        if recorder is not None and recorder.failure is not None and recorder.finished.done():
+            raise recorder.failure
         if plant.step != last:
             last, since = plant.step, time.monotonic()
         elif time.monotonic() - since > LONGEST_SILENCE:
@@ -101,7 +113,7 @@ def _drain(
 ) -> None:
     """Let the recorder take what is still under way."""
     executor.spin_until_future_complete(recorder.finished, LONGEST_SILENCE)
-    if recorder.realtime:
+    if recorder.realtime or recorder.failure is not None:
         return  # messages may be missing, and are counted
     if not recorder.finished.done():
         raise GraphError(f"the recorder missed {recorder.missing(topics, steps)} messages")

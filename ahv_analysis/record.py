@@ -14,6 +14,7 @@ from ahv_control.learner_message import learner_values
 from ahv_control.newton_raphson import nominal_response
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_plant.aerodynamics import AirData, air_data
+from ahv_plant.compiled import kernel
 from ahv_plant.constants import UNSTART_ALPHA
 from ahv_plant.state import State, Surfaces
 
@@ -52,8 +53,9 @@ class FlightRecord:
     @cached_property
     def air(self) -> AirData:
         """Air data, every field an array (N+1,)."""
-        rows = [air_data(State(*row), self.geometric) for row in self.states.tolist()]
-        return AirData(*np.array(rows).T)
+        rows = np.empty((len(self.states), len(AirData._fields)))
+        _fill_air_data(np.ascontiguousarray(self.states), self.geometric, rows)
+        return AirData(*np.ascontiguousarray(rows.T))
 
     @cached_property
     def climb_angle(self) -> Array:
@@ -89,6 +91,19 @@ class FlightRecord:
     def inlet_started(self) -> bool:
         """Whether the inlet stayed started: |alpha| <= 5 deg throughout."""
         return bool(np.all(np.abs(self.air.alpha) <= UNSTART_ALPHA))
+
+
+@kernel
+def _fill_air_data(states, geometric, rows):
+    """Fill `rows` (n, 7) with the air data of `states` (n, 13)."""
+    for step in range(len(states)):
+        s = states[step]
+        state = State(
+            s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11], s[12]
+        )
+        row, air = rows[step], air_data(state, geometric)
+        row[0], row[1], row[2], row[3] = air.speed, air.alpha, air.beta, air.mach
+        row[4], row[5], row[6] = air.dynamic_pressure, air.sin_alpha, air.cos_alpha
 
 
 def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:

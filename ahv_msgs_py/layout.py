@@ -11,6 +11,9 @@ from collections.abc import Sequence
 from struct import Struct
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 NANOSECONDS = 1_000_000_000  # [ns/s]
 _ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little-endian, no options
 
@@ -46,6 +49,16 @@ class Layout:
         constant = _string(frame, 8) + middle
         constant += bytes(-(8 + len(constant)) % 8)
         self._struct = Struct(f"<4siI{len(constant)}s{len(self.fields)}d{len(end)}s")
+        self._rows = np.dtype(
+            [
+                ("head", f"V{len(_ENCAPSULATION)}"),
+                ("seconds", "<i4"),
+                ("nanoseconds", "<u4"),
+                ("constant", f"V{len(constant)}"),
+                ("values", "<f8", len(self.fields)),
+                ("end", f"V{len(end)}"),
+            ]
+        )
         self._constant = constant
         self._end = end
 
@@ -64,6 +77,21 @@ class Layout:
         if head != _ENCAPSULATION or constant != self._constant or end != self._end:
             return None
         return seconds * NANOSECONDS + nanoseconds, tuple(values)
+
+    def decode_all(self, messages: Sequence[bytes]) -> tuple[NDArray, NDArray, NDArray]:
+        """Stamps (n,) [ns] and values (n, fields) of the messages of exactly this layout.
+
+        The third array (n,) are their places in `messages`; those of another layout are left out.
+        """
+        size = self._struct.size
+        fits = [place for place, data in enumerate(messages) if len(data) == size]
+        rows = np.frombuffer(b"".join(messages[place] for place in fits), self._rows)
+        known = rows["head"] == np.void(_ENCAPSULATION)
+        known &= rows["constant"] == np.void(self._constant)
+        known &= rows["end"] == np.void(self._end)
+        rows = rows[known]
+        stamps = rows["seconds"].astype(np.int64) * NANOSECONDS + rows["nanoseconds"]
+        return stamps, np.array(rows["values"]), np.array(fits, np.intp)[known]
 
     def values_of(self, message: Any) -> tuple[int, tuple[float, ...]]:
         """Stamp [ns] and values of a message object of this type; MessageError if unfit."""

@@ -1,0 +1,159 @@
+"""Kill recorders with kill -9 in mid-flight, see what is left: `python -m test.kill_recorder`.
+
+The flight is on the graph of this process in lockstep, every recorder in a process of its own. A
+bag is read twice: as it was left, by the stream reader of the `mcap` package alone, and recovered.
+"""
+
+import argparse
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Message
+from mcap.stream_reader import StreamReader
+
+from ahv_analysis import graph_flight
+from ahv_analysis.bag_recovery import recover
+from ahv_analysis.case import load_case
+from ahv_analysis.graph_flight import fly_graph
+from ahv_msgs_py.topics import NOMINAL_TOPICS
+from ahv_plant.constants import STEP_NS
+from ahv_plant.plant_node import PlantNode
+
+BOUND = 0.2  # [s] of wall time that a killed recorder may lose
+LOOK = 0.002  # [s] between looks at the plant
+BEGUN = 20_000  # [bytes] of a bag that has more than its message definitions
+
+
+class Kill(NamedTuple):
+    """What a recorder that was killed has left."""
+
+    bag: Path
+    step: int  # of the plant when the recorder was killed
+    due: int  # step of the plant BOUND before that: what the bag must hold
+    left: int  # last step with all its messages in the bag as it was left, or -1
+    recovered: Path
+
+
+class _Enough(Exception):
+    """All recorders are dead: the flight need not go on."""
+
+
+def kill_recorders(folder: Path, moments: Sequence[float], domain: int) -> list[Kill]:
+    """Fly with one recorder per moment [s], each killed so long after the first step."""
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+    program = Path(sys.executable).parent / "recorder"
+    bags = [folder / f"bag{number}" for number in range(len(moments))]
+    recorders = [
+        subprocess.Popen([program, "--ros-args", "-p", f"bag:={bag}"], env=environment)
+        for bag in bags
+    ]
+    plants: list[PlantNode] = []
+
+    class Plant(PlantNode):
+        """Waits for the recorders too."""
+
+        def __init__(self, values, context):
+            super().__init__(values | {"listeners": values["listeners"] + len(bags)}, context)
+            plants.append(self)
+
+    steps_at: list[tuple[float, int]] = []  # time [s], step of the plant
+    steps_of_death: dict[Path, tuple[float, int]] = {}
+
+    def watch() -> None:
+        while not plants or plants[0].step < 1:
+            time.sleep(LOOK)
+        started = time.monotonic()
+        waiting = dict(zip(bags, zip(moments, recorders, strict=True), strict=True))
+        while waiting:
+            now, step = time.monotonic(), plants[0].step
+            steps_at.append((now, step))
+            for bag, (moment, recorder) in list(waiting.items()):
+                file = bag / f"{bag.name}.mcap"
+                if now - started >= moment and file.stat().st_size > BEGUN:
+                    recorder.kill()
+                    steps_of_death[bag] = (now, step)
+                    del waiting[bag]
+            time.sleep(LOOK)
+
+    def progress(steps: int) -> None:
+        if len(steps_of_death) == len(bags):
+            raise _Enough
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    ours, graph_flight.PlantNode = graph_flight.PlantNode, Plant
+    try:
+        fly_graph(load_case("nominal_di"), None, domain=domain, progress=progress)
+    except _Enough:
+        pass
+    finally:
+        graph_flight.PlantNode = ours
+        for recorder in recorders:
+            recorder.kill()
+            recorder.wait()
+    watcher.join()
+    kills = []
+    for bag in bags:
+        died, step = steps_of_death[bag]
+        due = max((known for when, known in steps_at if when <= died - BOUND), default=0)
+        recovered = bag.with_name(f"{bag.name}-recovered")
+        left = _last_step(bag / f"{bag.name}.mcap")
+        recover(bag, recovered)
+        kills.append(Kill(bag, step, due, left, recovered))
+    return kills
+
+
+def _last_step(file: Path) -> int:
+    """Last step of which all messages are in the whole chunks of a file that was left."""
+    topics: dict[int, str] = {}
+    steps: dict[str, list[int]] = {topic.name: [] for topic in NOMINAL_TOPICS}
+    with file.open("rb") as stream:
+        try:
+            for record in StreamReader(stream, validate_crcs=True).records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message) and topics[record.channel_id] in steps:
+                    steps[topics[record.channel_id]].append(record.log_time // STEP_NS)
+        except (McapError, ValueError, OverflowError):
+            pass  # the end of what is whole
+    lasts = []
+    for found in steps.values():
+        places = [place for place, step in enumerate(found) if place != step]
+        assert not places, (len(found), found[max(0, places[0] - 3) : places[0] + 5])
+        lasts.append(len(found) - 1)
+    return min(lasts)
+
+
+def main() -> None:
+    """Kill as many recorders as asked for, one a flight; exit code 1 if one lost too much."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--latest", type=float, default=5.0, help="latest moment of a kill [s]")
+    options = parser.parse_args()
+    draw = random.Random(options.seed)
+    domain = int(os.environ.get("ROS_DOMAIN_ID", "99"))
+    lost = 0
+    print(f"{'killed at':>10}{'plant':>8}{'due':>8}{'in bag':>8}   steps; due {BOUND} s before")
+    for _ in range(options.kills):
+        moment = draw.uniform(0.3, options.latest)
+        with tempfile.TemporaryDirectory() as folder:
+            (kill,) = kill_recorders(Path(folder), [moment], domain)
+        lost += kill.left < kill.due
+        verdict = "" if kill.left >= kill.due else "  LOST TOO MUCH"
+        print(f"{moment:8.3f} s{kill.step:8}{kill.due:8}{kill.left:8}{verdict}", flush=True)
+    print(f"{options.kills - lost} of {options.kills} within {BOUND} s")
+    sys.exit(1 if lost else 0)
+
+
+if __name__ == "__main__":
+    main()
