@@ -26,8 +26,9 @@ class Guard:
 
     A message does not say who sent it. The middleware numbers the messages of every publisher from
     1 on, and that tells one from another: the publisher whose message was accepted first is obeyed
-    as long as its numbers go on, by one or so a step. Another one is refused until the first has been silent for
-    `SILENCE` of real time; in lockstep, where silence means nothing, until it is the only one.
+    as long as its numbers go on, by one or so a step. Another one is refused until the first has
+    been silent for `SILENCE` of real time; in lockstep, where silence means nothing, until it is
+    the only one.
     """
 
     def __init__(
