@@ -9,9 +9,10 @@ from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
 
-from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 
+from ahv_analysis.bag_reader import load_bag
+from ahv_analysis.bag_recovery import recover
 from ahv_analysis.case import load_case
 from ahv_analysis.errors import GraphError
 from ahv_analysis.faulty_node import INJECT
@@ -34,6 +35,7 @@ from ahv_plant.state import State
 CASE = "neuro_adaptive_sc_gdi"
 LEAD = 2.0  # [s] of undisturbed flight
 LONGEST_OUTAGE = 1.0  # [s] of a node
+LONGEST_LOSS = 0.5  # [s] of a bag whose recorder was killed
 SETTLE = 1.0  # [s] after an injection, in which it must be noticed
 PER_FLIGHT = 75  # injections, so that a flight stays within its 150 s
 NODES = ("outer_intermediate", "disturbance_learner", "inner_loop", "velocity")
@@ -160,6 +162,7 @@ def run_campaign(
             lambda: progress(len(done)),
         )
         flights.append(flight | _judge_bag(bag, done[before:]))
+    flights.append(_bereaved_flight(out / "bag-of-a-killed-recorder", done))
     report = _report(done, flights, seed)
     (out / "faults.json").write_text(json.dumps(report, indent=1, allow_nan=False) + "\n")
     return report
@@ -188,6 +191,58 @@ def _disturbed_flight(
     finally:
         spectator.close()
     return {"steps": spectator.stamp // STEP_NS, "unexpected_ends": unexpected}
+
+
+def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
+    """One flight that loses its recorder, and then its plant, and gets a new one."""
+    set_transport(realtime=True)
+    spectator = Spectator()
+    try:
+        case = load_case(CASE, {"duration": 3600.0})
+        with ProcessGraph(case, bag, realtime=True, spectators=1) as graph:
+            _wait_for_flight(spectator)
+            spectator.look(LEAD)
+            killed = spectator.stamp
+            graph.kill("recorder")
+            spectator.look(SETTLE)
+            went_on = spectator.stamp - killed
+            alpha = spectator.max_abs_alpha * DEGREES
+            goes_on = "the flight goes on" if went_on > 0.5 * SETTLE * 1e9 else ""
+            done.append(
+                Injection("recorder killed", "recorder", killed * 1e-9, 0.0, goes_on, 0.0, alpha)
+            )
+
+            start, seen = spectator.stamp, len(spectator.statuses)
+            spectator.max_abs_alpha = 0.0
+            graph.kill("plant")
+            spectator.look(2.0)
+            lost = {
+                node for _, node, _, text, _ in spectator.statuses[seen:] if "state lost" in text
+            }
+            graph.values["plant"] |= {"listeners": len(graph.controllers) + 1}  # no recorder
+            graph.start("plant")
+            spectator.look(5.0)
+            restarted = 1e9 < spectator.stamp != start and spectator.max_abs_alpha > 0.0
+            noticed = "all controllers: state lost" if lost >= {*NODES} and restarted else ""
+            alpha = spectator.max_abs_alpha * DEGREES
+            done.append(Injection("plant killed", "plant", start * 1e-9, 2.0, noticed, 1.5, alpha))
+            graph.end_flight()
+    finally:
+        spectator.close()
+    recovered = bag.with_name(bag.name + "-recovered")
+    recover(bag, recovered)
+    stamps = [
+        known[0]
+        for data in load_bag(recovered).topics[STATE.name].messages
+        if (known := STATE.layout.decode(data)) is not None
+    ]
+    return {
+        "steps": killed // STEP_NS,
+        "unexpected_ends": [],
+        "not_finite": {},
+        "states_missing_in_bag": 0,
+        "lost_with_the_recorder_s": max(0.0, (killed - max(stamps)) * 1e-9),
+    }
 
 
 def _wait_for_flight(spectator: Spectator) -> None:
@@ -244,16 +299,15 @@ def _judge_bag(bag: Path, injected: list[Injection]) -> dict[str, Any]:
     wrong = {entry.target for entry in injected if entry.kind in ("nan", "infinity")}
     stamps: set[int] = set()
     not_finite: Counter[str] = Counter()
-    topics = {topic.name: topic for topic in LOOP_TOPICS}
-    with Reader(bag) as reader:
-        links = [link for link in reader.connections if link.topic in topics]
-        for link, _, data in reader.messages(links):
-            known = topics[link.topic].layout.decode(data)
+    recorded = load_bag(bag).topics
+    for topic in LOOP_TOPICS:
+        for data in recorded[topic.name].messages:
+            known = topic.layout.decode(data)
             if known is None:
                 continue  # one of the wrong ones
-            if not math.isfinite(sum(known[1])) and link.topic not in wrong:
-                not_finite[link.topic] += 1
-            if link.topic == STATE.name and known[0] % STEP_NS == 0:
+            if not math.isfinite(sum(known[1])) and topic.name not in wrong:
+                not_finite[topic.name] += 1
+            if topic is STATE and known[0] % STEP_NS == 0:
                 stamps.add(known[0] // STEP_NS)
     last = max(stamps)
     return {
@@ -266,7 +320,7 @@ def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> 
     """Everything, and the verdict."""
     alpha = max(entry.max_abs_alpha for entry in done)
     kinds = {}
-    for kind in EXPECTED:
+    for kind in dict.fromkeys(entry.kind for entry in done):
         of_kind = [entry for entry in done if entry.kind == kind]
         if of_kind:
             latencies = [entry.latency for entry in of_kind if entry.latency is not None]
@@ -280,6 +334,7 @@ def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> 
     passed = (
         alpha <= UNSTART_ALPHA * DEGREES
         and not unnoticed
+        and all(flight.get("lost_with_the_recorder_s", 0.0) < LONGEST_LOSS for flight in flights)
         and all(
             not (flight["unexpected_ends"] or flight["not_finite"])
             and flight["states_missing_in_bag"] == 0

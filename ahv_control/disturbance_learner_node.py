@@ -4,6 +4,7 @@ import rclpy
 
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.flight_control import NEUTRAL, first_learner, next_learner
+from ahv_control.held_inputs import held_rates, held_surfaces, nothing
 from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.parameters import LEARNER_PARAMETERS, learner_settings
@@ -24,15 +25,12 @@ from ahv_plant.parameters import DEFAULT_START
 from ahv_plant.state import State, Surfaces
 
 
-def nothing(last: Values | None, age: int) -> None:
-    """Stand in for what is missing: there is nothing to learn from an incomplete step."""
-
-
 class DisturbanceLearnerNode(BaseNode):
     """Answers every state with the disturbance estimate and the state of the learner.
 
-    To learn from state k it needs state k - 1 and the commands that answered that one. Where one
-    of them is missing, in real time, the observer starts anew at the state; the weights stay.
+    To learn from state k it needs state k - 1 and the commands that answered that one. In real
+    time it reckons with the commands that the others hold; where the state is missing, the
+    observer starts anew at the new one, and the weights stay.
     """
 
     def __init__(
@@ -56,7 +54,7 @@ class DisturbanceLearnerNode(BaseNode):
         self._send_learner = self.sender(LEARNER)
         self._send_estimate = self.sender(DISTURBANCE_ESTIMATE)
         inputs = ("now", "before", "command", "surfaces")
-        fallbacks = dict.fromkeys(inputs[1:], nothing)
+        fallbacks = {"before": nothing, "command": held_rates, "surfaces": held_surfaces}
         self._put = self.join(inputs, self._learn, fallbacks, wait=False)
         self.receive(STATE, self._state_arrived)
         self.receive(RATE_COMMAND, lambda stamp, values: self._put("command", stamp, values))
@@ -80,12 +78,12 @@ class DisturbanceLearnerNode(BaseNode):
         stamp: int,
         now: Values,
         before: Values | None,
-        command: Values | None,
-        surfaces: Values | None,
+        command: Values,
+        surfaces: Values,
     ) -> None:
         assert self._learner is not None
         state = State(*now)
-        if before is None or command is None or surfaces is None:
+        if before is None:
             learner = self._anew(state)
         else:
             learner = next_learner(

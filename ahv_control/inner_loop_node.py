@@ -3,13 +3,14 @@
 import rclpy
 
 from ahv_control.flight_control import NEUTRAL
+from ahv_control.held_inputs import held_estimate, held_rates, nothing
 from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
 from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import learned_of, unlearned
 from ahv_control.newton_raphson import Solution, SolverStatus
 from ahv_control.parameters import INNER_LOOP_PARAMETERS, inner_loop
 from ahv_msgs_py.base_node import BaseNode
-from ahv_msgs_py.faults import HOLD, PERIOD, Fault
+from ahv_msgs_py.faults import Fault
 from ahv_msgs_py.node_process import run
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.stepwise import Values
@@ -27,22 +28,6 @@ FAULTS = {
     SolverStatus.ITERATION_LIMIT: Fault.NEWTON_LIMIT,
     SolverStatus.SINGULAR: Fault.NEWTON_SINGULAR,
 }
-
-
-def held_rates(last: Values | None, age: int) -> Values:
-    """Rate command [rad/s] while none comes: the last one for a while, then zero rates."""
-    if last is not None and age * PERIOD <= HOLD:
-        return last
-    return 0.0, 0.0, 0.0
-
-
-def no_observer(last: Values | None, age: int) -> None:
-    """Stand in for a learner that is gone: an old observer would be worse than none."""
-
-
-def held_estimate(last: Values | None, age: int) -> Values:
-    """Disturbance estimate while none comes: the last one; what the vehicle lacks, it lacks."""
-    return last or (0.0,) * 6
 
 
 class InnerLoopNode(BaseNode):
@@ -76,7 +61,7 @@ class InnerLoopNode(BaseNode):
                 self._answer_adaptive,
                 {
                     RATE_COMMAND: held_rates,
-                    LEARNER: no_observer,
+                    LEARNER: nothing,
                     DISTURBANCE_ESTIMATE: held_estimate,
                 },
             )

@@ -3,6 +3,7 @@
 import rclpy
 
 from ahv_control.flight_control import NEUTRAL
+from ahv_control.held_inputs import held_surfaces
 from ahv_control.parameters import VELOCITY_PARAMETERS, velocity_loop
 from ahv_control.velocity_loop import throttle_command
 from ahv_msgs_py.base_node import BaseNode
@@ -14,11 +15,6 @@ from ahv_msgs_py.topics import SURFACE_COMMAND, THROTTLE_COMMAND
 from ahv_plant.constants import THROTTLE_MAXIMUM, THROTTLE_MINIMUM
 from ahv_plant.parameters import DEFAULT_START
 from ahv_plant.state import State, Surfaces
-
-
-def held_surfaces(last: Values | None, age: int) -> Values:
-    """Surfaces [rad] to reckon with while none are commanded: the plant holds them as well."""
-    return last or NEUTRAL
 
 
 class VelocityNode(BaseNode):

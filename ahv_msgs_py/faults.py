@@ -94,8 +94,8 @@ class Fault(Enum):
         "outer_intermediate, inner_loop, velocity, disturbance_learner, in real time",
         "an input of a step has not come when the next state does",
         "rate command: held for 200 ms, then zero rates; learner: last estimate, observer at the "
-        "state; surfaces: held; the learner itself starts its observer anew at the state and "
-        "keeps its weights",
+        "state; surfaces: what the plant holds; a state: the learner starts its observer anew at "
+        "the next one and keeps its weights",
         "10 ms",
     )
     STATE_LOST = Response(

@@ -1,0 +1,33 @@
+"""What the control nodes go on with while an input stays away, in real time.
+
+Each takes the last values, None if there were none, and their age in steps.
+"""
+
+from ahv_control.flight_control import NEUTRAL
+from ahv_msgs_py.faults import HOLD, PERIOD
+from ahv_msgs_py.stepwise import Values
+from ahv_plant.safe_command import safe_surfaces
+from ahv_plant.state import Surfaces
+
+
+def held_rates(last: Values | None, age: int) -> Values:
+    """Rate command [rad/s]: the last one for a while, then zero rates."""
+    if last is not None and age * PERIOD <= HOLD:
+        return last
+    return 0.0, 0.0, 0.0
+
+
+def held_surfaces(last: Values | None, age: int) -> Values:
+    """Surfaces [rad]: those that the plant holds, and then its safe command."""
+    if last is None:
+        return NEUTRAL
+    return last if age * PERIOD <= HOLD else safe_surfaces(Surfaces(*last))
+
+
+def held_estimate(last: Values | None, age: int) -> Values:
+    """Disturbance estimate: the last one; what the vehicle lacks, it still lacks."""
+    return last or (0.0,) * 6
+
+
+def nothing(last: Values | None, age: int) -> None:
+    """Stand in for what cannot be held: an old observer, a state of long ago."""

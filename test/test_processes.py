@@ -1,0 +1,116 @@
+"""One process per node: the same bits in lockstep, and flight through faults in real time."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from ahv_analysis.bag_reader import read_bag
+from ahv_analysis.case import load_case
+from ahv_analysis.errors import GraphError
+from ahv_analysis.fault_campaign import EXPECTED, NODES, Spectator, draw_injections, run_campaign
+from ahv_analysis.faulty_node import wrong_messages
+from ahv_analysis.flight import fly
+from ahv_analysis.process_flight import ProcessGraph, fly_processes, set_transport
+from ahv_analysis.record import record
+from ahv_msgs_py.faults import PERIOD
+from ahv_msgs_py.topics import SURFACE_COMMAND
+from ahv_plant.constants import DEGREES, STEP_NS
+
+CASE = "neuro_adaptive_sc_gdi"
+TRACKING = 0.5  # [deg], [deg/s] within which a disturbed flight is back
+
+
+@pytest.fixture(autouse=True)
+def private(monkeypatch, domain):
+    """Every test in a domain of its own, with the transport that it sets."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+
+
+def test_processes_in_lockstep_fly_the_same_bits(tmp_path):
+    case = load_case(CASE, {"duration": 5.0})
+    ended_early, _ = fly_processes(case, tmp_path / "bag")
+    assert ended_early == ""
+    flown, computed = read_bag(tmp_path / "bag"), record(fly(case), False)
+    for name in ("stamps", "states", "surfaces", "throttle", "learner", "estimates"):
+        assert np.array_equal(getattr(flown, name), getattr(computed, name)), name
+
+
+def test_a_controller_that_dies_in_lockstep_ends_the_flight(tmp_path):
+    case = load_case(CASE, {"duration": 3000.0})
+    killed = []
+
+    def kill(steps):
+        if steps > 0 and not killed:
+            killed.append(steps)
+            os.kill(node_pids()["velocity"], signal.SIGKILL)
+
+    with pytest.raises(GraphError, match="velocity ended in flight"):
+        fly_processes(case, None, progress=kill)
+    assert killed
+
+
+def node_pids():
+    """Process of every node, from the family of this one's server."""
+    import multiprocessing
+
+    return {child.name: child.pid for child in multiprocessing.active_children()}
+
+
+def reference(seconds):
+    """The flight that nothing disturbs."""
+    return record(fly(load_case(CASE, {"duration": seconds})), False)
+
+
+def test_every_controller_can_be_killed_and_started_again(tmp_path):
+    """Within a second, in flight: the flight comes back to where it would have been."""
+    calm = reference(40.0)
+    set_transport(realtime=True)
+    spectator = Spectator()
+    try:
+        case = load_case(CASE, {"duration": 3600.0})
+        with ProcessGraph(case, None, realtime=True, spectators=1) as graph:
+            deadline = time.monotonic() + 30.0
+            while spectator.stamp < 100 * STEP_NS and time.monotonic() < deadline:
+                spectator.look(0.1)
+            for name in NODES:
+                spectator.max_abs_alpha = 0.0
+                graph.kill(name)
+                graph.start(name)
+                spectator.look(4.5)
+                state, then = spectator.state, calm.states[spectator.stamp // STEP_NS]
+                theta, Q = abs(state.theta - then[7]), abs(state.Q - then[4])
+                assert theta * DEGREES < TRACKING, name
+                assert Q * DEGREES < TRACKING, name
+                assert abs(state.u - then[0]) < 5.0 and abs(state.h - then[11]) < 50.0, name
+                assert spectator.max_abs_alpha * DEGREES < 5.0, name
+                assert graph.ended() == {}, name
+            graph.end_flight()
+    finally:
+        spectator.close()
+
+
+def test_a_short_fault_campaign_passes(tmp_path):
+    report = run_campaign(8, 2017, tmp_path / "faults")
+    assert report["unnoticed"] == []
+    assert report["passed"], report["flights"]
+    assert report["injections"] == 10  # and the loss of recorder and plant
+    assert (tmp_path / "faults" / "faults.json").is_file()
+
+
+def test_every_kind_of_fault_is_drawn():
+    from random import Random
+
+    kinds = [kind for kind, _, _ in draw_injections(Random(0), len(EXPECTED))]
+    assert sorted(kinds) == sorted(EXPECTED)
+
+
+def test_wrong_messages_are_wrong():
+    whole = SURFACE_COMMAND.layout.encode(7 * PERIOD, (0.1, 0.1, 0.0))
+    before = SURFACE_COMMAND.layout.encode(6 * PERIOD, (0.1, 0.1, 0.0))
+    for kind in EXPECTED:
+        if kind not in ("killed", "stopped", "second publisher"):
+            assert wrong_messages(SURFACE_COMMAND, kind, whole, before) != [whole], kind
