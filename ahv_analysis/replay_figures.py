@@ -1,6 +1,7 @@
 """Figures of a replay: commands as recorded and as replayed, and the difference between them."""
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,9 @@ from ahv_msgs_py.topics import (
 from ahv_plant.constants import DEGREES
 
 
+ROUNDING = 1e-6  # [unit of the label] what moves less is drawn as the constant that it is
+
+
 class Line(NamedTuple):
     """One field of a topic: place, label and scale to the unit of the label."""
 
@@ -47,11 +51,10 @@ TITLES: dict[LoopTopic, tuple[str, Sequence[Line]]] = {
         [Line(0, "$P^*$ [deg/s]"), Line(1, "$Q^*$ [deg/s]"), Line(2, "$R^*$ [deg/s]")],
     ),
     LEARNER: (
-        "Approximate plant of the disturbance learner",
+        "Approximate and desired plant of the disturbance learner",
         [
-            Line(0, "$P_a$ [deg/s]"),
-            Line(1, "$Q_a$ [deg/s]"),
-            Line(2, "$R_a$ [deg/s]"),
+            Line(index, f"${rate}_{plant}$ [deg/s]")
+            for index, (plant, rate) in enumerate(product("ad", "PQR"))
         ],
     ),
     DISTURBANCE_ESTIMATE: (
@@ -114,6 +117,8 @@ def draw_replay(
             gap = _column(replayed, line, common)[1] - _column(recorded, line, common)[1]
             between.plot(np.array(common) / NANOSECONDS, gap, color="C3")
             both.set_ylabel(line.label)
+            if max(np.ptp(before[1]), np.ptp(after[1])) < ROUNDING:
+                both.set_ylim(before[1][0] - 1.0, before[1][0] + 1.0)
             for axis in (both, between):
                 axis.margins(x=0)
                 axis.ticklabel_format(useOffset=False)
@@ -123,7 +128,7 @@ def draw_replay(
         figure.suptitle(title, fontsize=10, x=0.02, ha="left")
         figure.align_ylabels(axes[:, 0])
         axes[0][0].legend(
-            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=8
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8
         )
         figure.tight_layout()
     return figure
