@@ -25,7 +25,6 @@ from ahv_msgs_py.topics import (
 )
 from ahv_plant.constants import DEGREES
 
-
 ROUNDING = 1e-6  # [unit of the label] what moves less is drawn as the constant that it is
 
 
