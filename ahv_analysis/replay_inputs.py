@@ -11,11 +11,8 @@ from typing import Any, NamedTuple
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
-from rosbags.rosbag2 import Reader
-from rosbags.rosbag2.errors import ReaderError
 
-from ahv_analysis.bag_reader import read_notes
-from ahv_analysis.errors import BagError
+from ahv_analysis.bag_reader import Bag, load_bag, notes_of
 from ahv_msgs_py.base_node import message_class
 from ahv_msgs_py.guard import Guard, Refusal
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
@@ -59,33 +56,23 @@ def read_recording(path: Path) -> Recording:
 
     Raises BagError for what cannot be read.
     """
-    messages = read_messages(path)
+    bag = load_bag(path)
     topics: dict[LoopTopic, dict[int, Message]] = {}
     refused = 0
     for topic in LOOP_TOPICS:
-        recorded = messages.get((topic.name, topic.layout.type_name), [])
+        recorded = _messages(bag, topic.name, topic.layout.type_name)
         obeyed = _obeyed(topic, recorded)
         refused += len(recorded) - len(obeyed)
         if obeyed:
             topics[topic] = obeyed
-    changes = _changes(messages.get((DIAGNOSTICS.name, DIAGNOSTICS.type_name), []))
-    return Recording(path, read_notes(path), topics, changes, refused)
+    changes = _changes(_messages(bag, DIAGNOSTICS.name, DIAGNOSTICS.type_name))
+    return Recording(path, notes_of(bag.metadata), topics, changes, refused)
 
 
-def read_messages(path: Path) -> dict[tuple[str, str], list[bytes]]:
-    """CDR bytes of a bag by topic and type, in the order of filing; BagError if there are none."""
-    if not (path / "metadata.yaml").is_file():
-        raise BagError(f"{path} is not a bag: a bag is a folder with a metadata.yaml")
-    messages: dict[tuple[str, str], list[bytes]] = {}
-    try:
-        with Reader(path) as reader:
-            for connection, _, data in reader.messages():
-                messages.setdefault((connection.topic, connection.msgtype), []).append(data)
-    except (ReaderError, OSError, KeyError, ValueError, AssertionError) as error:
-        raise BagError(
-            f"{path} cannot be read as a bag: {' '.join(str(error).split())}"
-        ) from error
-    return messages
+def _messages(bag: Bag, name: str, type_name: str) -> list[bytes]:
+    """Messages of a topic, if it is of the type that we know."""
+    recorded = bag.topics.get(name)
+    return recorded.messages if recorded and recorded.type_name == type_name else []
 
 
 def _obeyed(topic: LoopTopic, recorded: Iterable[bytes]) -> dict[int, Message]:
