@@ -27,6 +27,7 @@ from ahv_analysis.console import (
 )
 from ahv_analysis.faults_command import faults
 from ahv_analysis.report import report
+from ahv_analysis.replay_command import replay
 from ahv_plant.constants import DEGREES, INITIAL_MASS, STEP
 from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED
 
@@ -42,6 +43,7 @@ app.add_typer(faults, name="faults")
 app.add_typer(bag, name="bag")
 app.command()(table)
 app.command()(report)
+app.command()(replay)
 
 
 class Engine(StrEnum):
