@@ -10,10 +10,13 @@ from pathlib import Path
 
 from ahv_analysis.case import NODES
 from ahv_analysis.recorder_node import RECORDER_PARAMETERS
+from ahv_msgs_py.base_node import SHELL_PARAMETERS
+from ahv_msgs_py.faults import fault_rows
 from ahv_msgs_py.parameters import Parameter, Value
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
     DISTURBANCE_ESTIMATE,
+    FINITE,
     LEARNER,
     LOOP_TOPICS,
     RATE_COMMAND,
@@ -90,8 +93,15 @@ def _numbers(topic: LoopTopic) -> str:
     places = PLACES.get(topic.layout.type_name, [f"position[{i}]" for i in range(len(names))])
     if len(units) == 1:
         units *= len(names)
-    rows = zip((f"`{place}`" for place in places), names, units, strict=True)
-    return table(("place", "name", "unit"), rows)
+    rows = [
+        (f"`{place}`", name, unit, _range(*bounds) if bounds != FINITE else "finite")
+        for place, name, unit, bounds in zip(places, names, units, topic.bounds, strict=True)
+    ]
+    return table(("place", "name", "unit", "range"), rows)
+
+
+def _range(low: float | None, high: float | None) -> str:
+    return "" if low is None or high is None else f"{low:g} to {high:g}"
 
 
 def viewer_topics() -> str:
@@ -104,22 +114,21 @@ def viewer_topics() -> str:
 
 
 def parameters() -> str:
-    """Table of the parameters of every node."""
+    """Table of the parameters of every node, first those that all have."""
     head = ("parameter", "default", "unit", "range", "in flight", "meaning")
+    rooms = {"every node": SHELL_PARAMETERS, **NODES, "recorder": RECORDER_PARAMETERS}
     return "\n".join(
-        f"## {node}\n\n{table(head, map(_parameter, known))}"
-        for node, known in (NODES | {"recorder": RECORDER_PARAMETERS}).items()
+        f"## {node}\n\n{table(head, map(_parameter, known))}" for node, known in rooms.items()
     )
 
 
 def _parameter(parameter: Parameter) -> tuple[str, ...]:
-    low, high = parameter.minimum, parameter.maximum
     return (
         f"`{parameter.name}`",
         f"`{_yaml(parameter.default)}`",
         parameter.unit,
-        "" if low is None or high is None else f"{low:g} to {high:g}",
-        "yes" if getattr(parameter, "in_flight", False) else "",
+        _range(parameter.minimum, parameter.maximum),
+        "yes" if parameter.in_flight else "",
         parameter.description,
     )
 
@@ -128,8 +137,13 @@ def _yaml(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value!r}".replace("'", '"')
 
 
+def faults() -> str:
+    """Table of the faults, as `ahv faults` lists them."""
+    return table(("fault", "noticed by", "detection", "response", "latency"), fault_rows())
+
+
 PARTS: dict[str, Callable[[], str]] = {
-    function.__name__: function for function in (graph, loop_topics, viewer_topics, parameters)
+    part.__name__: part for part in (graph, loop_topics, viewer_topics, parameters, faults)
 }
 
 

@@ -26,7 +26,7 @@ def learned_of(learner: Sequence[float], estimate: Sequence[float]) -> Learned:
 def unlearned(state: State, estimate: Sequence[float]) -> Learned:
     """What the inner loop takes while the learner is gone: the estimate alone.
 
-    With both observers at the state, eqs 4.4-4.5 are the nominal law less d-hat.
+    With both observers at the state, eqs 4.4-4.5 are the nominal law less d-hat [rad/s^2].
     """
     rates = Rates(state.P, state.Q, state.R)
     return Learned(rates, rates, Rates(*estimate[3:6]))

@@ -316,7 +316,7 @@ class BaseNode(LifecycleNode):
             handle(stamp, values)
 
         # two arguments ask for the message's number; the EventsExecutor gives both in one
-        read.__signature__ = inspect.signature(lambda data, info: None)  # type: ignore[attr-defined]
+        read.__signature__ = inspect.signature(lambda data, info: None)
         subscription = self.create_subscription(
             message_type, topic.name, read, self.loop_quality(), raw=True
         )

@@ -12,7 +12,7 @@ MILLISECONDS = 1e-6  # [ms/ns]
 
 
 def percentile(sorted_values: "array[int]", share: float) -> int:
-    """Nearest-rank percentile of values in rising order; `share` is 0 to 1."""
+    """Nearest-rank percentile of values of any unit in rising order; `share` is 0 to 1."""
     rank = max(1, -(-len(sorted_values) * round(share * 1000) // 1000))
     return sorted_values[rank - 1]
 
@@ -45,7 +45,7 @@ class Health:
         self._latencies.append(self._clock() - self._state_came)
 
     def extreme(self, name: str, value: float) -> None:
-        """Keep the largest `value` of a name."""
+        """Keep the largest `value` of a name, in any unit."""
         if value > self.extremes.get(name, float("-inf")):
             self.extremes[name] = value
 

@@ -47,7 +47,7 @@ class ViewerTopic(NamedTuple):
 
 
 # Bounds: beyond them a value cannot be meant. What has no bound of its own must be finite.
-_FINITE = (-float_info.max, float_info.max)
+FINITE = (-float_info.max, float_info.max)
 _DEFLECTION = (-0.7, 0.55)  # [rad] a little beyond the stops
 _THROTTLE = (0.0, 1.0)  # [-]
 _MASS = (1.0, 1e7)  # [kg]
@@ -57,21 +57,21 @@ STATE = LoopTopic(
     "/ahv/state",
     NamedVector(BODY_FRAME, STATE_NAMES),
     "m/s, m/s, m/s, rad/s, rad/s, rad/s, rad, rad, rad, m, m, m, kg",
-    (_FINITE,) * 12 + (_MASS,),
+    (FINITE,) * 12 + (_MASS,),
     "vehicle state at 100 Hz",
 )
 ATTITUDE_COMMAND = LoopTopic(
     "/ahv/attitude_command",
     StampedVector(EARTH_FRAME, ("phi", "theta", "psi")),
     "rad",
-    (_FINITE,) * 3,
+    (FINITE,) * 3,
     "attitude command phi*, theta*, psi* of the outer loop",
 )
 RATE_COMMAND = LoopTopic(
     "/ahv/rate_command",
     StampedVector(BODY_FRAME, ("P", "Q", "R")),
     "rad/s",
-    (_FINITE,) * 3,
+    (FINITE,) * 3,
     "body-rate command P*, Q*, R* of the intermediate loop",
 )
 SURFACE_COMMAND = LoopTopic(
@@ -94,14 +94,14 @@ DISTURBANCE_ESTIMATE = LoopTopic(
     "/ahv/disturbance_estimate",
     StampedAcceleration(BODY_FRAME, ("x", "y", "z", "P", "Q", "R")),
     "m/s^2, m/s^2, m/s^2, rad/s^2, rad/s^2, rad/s^2",
-    (_FINITE,) * 6,
+    (FINITE,) * 6,
     "learned disturbance d-hat of the rates of P, Q, R, as angular acceleration; no linear part",
 )
 LEARNER = LoopTopic(
     "/ahv/learner",
     NamedVector(BODY_FRAME, LEARNER_NAMES),
     ", ".join(["rad/s"] * 6 + ["deg/s^2 by that of the term in deg/s"] * (3 * len(BASIS_NAMES))),
-    (_FINITE,) * len(LEARNER_NAMES),
+    (FINITE,) * len(LEARNER_NAMES),
     "state of the disturbance learner: approximate plant, desired plant, weights of every term",
 )
 LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)

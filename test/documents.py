@@ -18,7 +18,7 @@ PAGES = sorted(
 )
 SLOW = "<!-- slow -->"  # above a block that takes minutes
 SHELL = ("", "sh")  # a block that does not say its language is one of commands
-ELSEWHERE = ("colcon", "git", "ros2", "rosdep", "source", "sudo")  # on a machine with ROS 2
+ELSEWHERE = ("colcon", "git", "plotjuggler", "ros2", "rosdep", "source", "sudo")  # ROS machines
 NODES = [path.name for path in (ROOT / "resource" / "nodes").iterdir()]
 SETTING = re.compile(r"[A-Z_]+=")  # of an environment variable, before a program
 LONGEST = 900  # [s]

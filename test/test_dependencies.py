@@ -20,7 +20,9 @@ PYTHON = {
     "catkin_pkg": ("catkin_pkg", "python3-catkin-pkg-modules"),
     "distributed": ("distributed", None),
     "hypothesis": ("hypothesis", "python3-hypothesis"),
+    "jinja2": ("jinja2", "python3-jinja2"),
     "llvmlite": ("numba", None),  # its compiler
+    "lz4": ("mcap", None),  # which decompresses with it
     "markdown_it": ("markdown-it-py", None),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "mcap": ("mcap", None),
@@ -28,6 +30,7 @@ PYTHON = {
     "mpmath": ("mpmath", None),
     "numba": ("numba", None),  # python3-numba is too old for Python 3.12
     "numpy": ("numpy", "python3-numpy"),
+    "playwright": ("playwright", None),
     "pyarrow": ("pyarrow", None),
     "pytest": ("pytest", "python3-pytest"),
     "rich": ("rich", "python3-rich"),
@@ -35,13 +38,16 @@ PYTHON = {
     "scipy": ("scipy", "python3-scipy"),
     "setuptools": ("setuptools", "python3-setuptools"),
     "typer": ("typer", "python3-typer"),
+    "xarray": ("xarray", None),
     "yaml": ("pyyaml", "python3-yaml"),
+    "zstandard": ("mcap", None),  # which decompresses with it
 }
 # Packages of ROS itself: their own key, and by pip in one of two bundles or not at all.
 ROS = {
     "ament_index_python": "ros-jazzy-rclpy",
     "launch": None,
     "launch_ros": None,
+    "lifecycle_msgs": "ros-jazzy-rclpy",
     "rcl_interfaces": "ros-jazzy-rclpy",
     "rclpy": "ros-jazzy-rclpy",
     "rosgraph_msgs": "ros-jazzy-rclpy",
@@ -49,6 +55,7 @@ ROS = {
     "geometry_msgs": "ros-jazzy-common-interfaces",
     "nav_msgs": "ros-jazzy-common-interfaces",
     "sensor_msgs": "ros-jazzy-common-interfaces",
+    "std_msgs": "ros-jazzy-common-interfaces",
     "tf2_msgs": None,
 }
 KNOWN = PYTHON | {name: (bundle, name) for name, bundle in ROS.items()}

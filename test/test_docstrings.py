@@ -22,10 +22,15 @@ SOURCES = {
 }
 # Tools, and what crosses a topic: no equation of the report stands behind them.
 OWN = {f"ahv_plant.{name}" for name in ("compiled", "lanes", "elementary", "departure", "state")}
-OWN |= {"ahv_plant.parameters", "ahv_control.parameters", "ahv_control.learner_message"}
+OWN |= {
+    "ahv_plant.safe_command",
+    "ahv_plant.parameters",
+    "ahv_control.parameters",
+    "ahv_control.learner_message",
+}
 LAWS = [name for name in SOURCES if name not in OWN and not name.startswith("ahv_msgs_py")]
 
-_FACTOR = r"(?:m|s|kg|N|Pa|J|K|rad|deg|ns|Hz|1)(?:\^\d)?"
+_FACTOR = r"(?:m|s|kg|N|Pa|J|K|rad|deg|ms|ns|Hz|1)(?:\^\d)?"
 UNIT = re.compile(rf"\[(?:-|{_FACTOR}(?:[ /]\(?{_FACTOR}\)?)*(?:, [^]]+)?)[\] ]")
 IN_WORDS = re.compile(r"in degrees|in deg/s|any unit|their units|units of")
 ORIGIN = re.compile(r"\b(?:eqs?|[Ss]ections?|[Cc]hapters?|Table|Fig\.) [1-5]|\b(?:19|20)\d\d\b")

@@ -93,7 +93,7 @@ def test_what_a_command_names_exists(place):
         "ahv fly nominal_di --outt flights/one",
         "ahv monte-carlo --contoller neuro_adaptive_di",
         "make tset",
-        "python -m ahv_analysis.studdy",
+        "python -m ahv_analysis.stdy",
         "ros2 launch ahv flight.launch.py cas:=nominal_di",
         "ros2 run ahv plnt",
     ],
