@@ -78,7 +78,9 @@ class Layout:
             return None
         return seconds * NANOSECONDS + nanoseconds, tuple(values)
 
-    def decode_all(self, messages: Sequence[bytes]) -> tuple[NDArray, NDArray, NDArray]:
+    def decode_all(
+        self, messages: Sequence[bytes]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.intp]]:
         """Stamps (n,) [ns] and values (n, fields) of the messages of exactly this layout.
 
         The third array (n,) are their places in `messages`; those of another layout are left out.

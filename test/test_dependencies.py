@@ -22,6 +22,7 @@ PYTHON = {
     "hypothesis": ("hypothesis", "python3-hypothesis"),
     "llvmlite": ("numba", None),  # its compiler
     "markdown_it": ("markdown-it-py", None),
+    "lz4": ("mcap", None),  # which packs its chunks with it, as with zstandard
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "mcap": ("mcap", None),
     "mcap_ros2": ("mcap-ros2-support", None),
@@ -35,7 +36,9 @@ PYTHON = {
     "scipy": ("scipy", "python3-scipy"),
     "setuptools": ("setuptools", "python3-setuptools"),
     "typer": ("typer", "python3-typer"),
+    "xarray": ("xarray", None),
     "yaml": ("pyyaml", "python3-yaml"),
+    "zstandard": ("mcap", None),
 }
 # Packages of ROS itself: their own key, and by pip in one of two bundles or not at all.
 ROS = {
