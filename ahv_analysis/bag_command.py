@@ -113,7 +113,7 @@ def _flight(path: Path) -> dict[str, Any]:
 def _span(facts: dict[str, Any]) -> str:
     """How long was flown, in words."""
     if facts["duration_s"] is None:
-        return "but of no topic of the loop all"
+        return "no step of a flight with all its messages"
     planned = f" of {facts['planned_s']:g} s" if facts["planned_s"] else ""
     missing = f", {facts['missing_steps']} are missing" if facts["missing_steps"] else ""
     return f"{facts['duration_s']:g} s{planned}, {facts['steps']} steps{missing}"

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.experimental import EventsExecutor
+from rclpy.task import Future
 
 from ahv_analysis.case import Case, notes
 from ahv_analysis.errors import GraphError
@@ -18,7 +20,7 @@ from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
 LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
-LOOK = 0.2  # [s] between looks at the progress
+LOOK = 0.2  # [s] of wall time between looks at the progress
 
 
 def loop_topics(case: Case) -> Sequence[LoopTopic]:
@@ -93,19 +95,29 @@ def _spin(
     recorder: RecorderNode | None,
     progress: Callable[[int], None],
 ) -> None:
-    """Run the graph until the flight is over, or until the recorder gives it up."""
+    """Run the graph until the flight is over, or until the recorder gives it up.
+
+    The executor looks at the time only when nothing waits for it: in lockstep hardly ever. So
+    progress comes by a timer, and the end by a future.
+    """
+    over = Future(executor=None)
+    for node in (plant, recorder):
+        if node is not None:
+            node.finished.add_done_callback(lambda _: over.done() or over.set_result(None))
+    steady = Clock(clock_type=ClockType.STEADY_TIME)
+    plant.create_timer(LOOK, lambda: progress(plant.step), clock=steady)
     last, since = -1, time.monotonic()
-    while not plant.finished.done():
-        executor.spin_until_future_complete(plant.finished, LOOK)
-        progress(plant.step)
-        if recorder is not None and recorder.failure is not None and recorder.finished.done():
-            raise recorder.failure
+    while not over.done():
+        executor.spin_until_future_complete(over, LOOK)
         if plant.step != last:
             last, since = plant.step, time.monotonic()
         elif time.monotonic() - since > LONGEST_SILENCE:
             raise GraphError(
                 f"the graph stopped at step {plant.step}: no answer for {LONGEST_SILENCE:g} s"
             )
+    if recorder is not None and recorder.failure is not None and recorder.finished.done():
+        raise recorder.failure
+    progress(plant.step)
 
 
 def _drain(

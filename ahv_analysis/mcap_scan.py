@@ -71,8 +71,8 @@ def scan(data: bytes) -> Iterator[Piece]:
     """
     position, whole = len(MAGIC), True
     if data[:position] != MAGIC:
-        yield Damage(0, len(data), "it does not begin as an MCAP file does")
-        return
+        yield Damage(0, position, "it does not begin as an MCAP file does")
+        whole = False
     while position < len(data):
         opcode, end = _record(data, position, len(data))
         if opcode == Opcode.FOOTER and data[end:] == MAGIC:
@@ -119,9 +119,12 @@ def _contents(data: bytes, position: int, stop: int) -> tuple[list[Piece], int]:
         end = position + _HEAD.size + length
         if end > stop:
             break
-        if opcode == Opcode.MESSAGE and length >= _MESSAGE.size:
-            channel, _, log_time, _ = body(data, position + _HEAD.size)
-            messages.append((channel, log_time, position, end))
+        if opcode == Opcode.MESSAGE:
+            if length < _MESSAGE.size:
+                definitions.append(Damage(position, end - position, "a message is damaged"))
+            else:
+                channel, _, log_time, _ = body(data, position + _HEAD.size)
+                messages.append((channel, log_time, position, end))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions += _pieces(data, opcode, position, end)
         else:

@@ -80,7 +80,7 @@ class Layout:
 
     def decode_all(
         self, messages: Sequence[bytes]
-    ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.intp]]:
         """Stamps (n,) [ns] and values (n, fields) of the messages of exactly this layout.
 
         The third array (n,) are their places in `messages`; those of another layout are left out.

@@ -310,7 +310,7 @@ def cut(bag, folder):
     "make, words",
     [
         (lambda bag, tmp: [tmp / "none", "--out", tmp / "o"], "none is not a bag"),
-        (lambda bag, tmp: [cut(bag, tmp), "--out", tmp / "o"], "cut cannot be read as a bag"),
+        (lambda bag, tmp: [cut(bag, tmp), "--out", tmp / "o"], "cut is not whole"),
         (lambda bag, tmp: [a_single_step(tmp), "--out", tmp / "o"], "holds no two steps"),
         (lambda bag, tmp: [bag, bag, "--out", tmp / "o"], "is given 2 times"),
         (lambda bag, tmp: [bag, "--out", bag / "metadata.yaml"], "cannot write pages to"),

@@ -1,0 +1,120 @@
+"""A flight as a Dataset has every signal with its unit and frame, and leaves it without a loss."""
+
+import io
+import json
+
+import numpy as np
+import pyarrow.csv
+import pyarrow.parquet
+import pytest
+import xarray
+
+from ahv_analysis.bag_reader import read_bag
+from ahv_analysis.case import load_case
+from ahv_analysis.dataset import (
+    AIR_SIGNALS,
+    ATTITUDE_SIGNALS,
+    ESTIMATE_SIGNALS,
+    EXPORTS,
+    LEARNER_SIGNALS,
+    RATE_SIGNALS,
+    STATE_SIGNALS,
+    SURFACE_SIGNALS,
+    THROTTLE_SIGNALS,
+    bag_dataset,
+)
+from ahv_analysis.flight import fly_library
+from ahv_msgs_py.topics import LEARNER_NAMES, LOOP_TOPICS
+from ahv_plant.aerodynamics import air_data
+from ahv_plant.state import State
+
+RECORDED = (
+    *STATE_SIGNALS,
+    *ATTITUDE_SIGNALS,
+    *RATE_SIGNALS,
+    *SURFACE_SIGNALS,
+    *THROTTLE_SIGNALS,
+)
+
+
+@pytest.fixture(scope="module", params=["nominal_di", "neuro_adaptive_di"])
+def bag(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("flight") / "bag"
+    fly_library(load_case(request.param, {"duration": 0.5}), path)
+    return path
+
+
+def test_every_recorded_value_is_there(bag):
+    flight, record = bag_dataset(bag), read_bag(bag)
+    assert flight["time"].values.tolist() == record.time.tolist()
+    arrays = [
+        record.states,
+        record.attitude_commands,
+        record.rate_commands,
+        record.surfaces,
+        record.throttle[:, None],
+    ]
+    signals = [*RECORDED]
+    if record.learner is not None:
+        arrays += [record.learner, record.estimates]
+        signals += [*LEARNER_SIGNALS, *ESTIMATE_SIGNALS]
+    assert set(flight) == {signal.name for signal in (*signals, *AIR_SIGNALS)}
+    for signal, column in zip(signals, np.hstack(arrays).T, strict=True):
+        assert flight[signal.name].values.tobytes() == column.tobytes(), signal.name
+
+
+def test_derived_signals_are_those_of_the_laws(bag):
+    flight, record = bag_dataset(bag), read_bag(bag)
+    for place, row in enumerate(record.states.tolist()):
+        air = air_data(State(*row), record.geometric)
+        for name in ("alpha", "beta", "mach", "dynamic_pressure", "speed"):
+            assert flight[name].values[place] == getattr(air, name), name
+    climb = np.gradient(flight["h"].values, flight["time"].values)
+    assert np.allclose(np.sin(flight["gamma"]) * flight["speed"], climb, atol=0.5)
+
+
+def test_every_signal_says_what_it_is(bag):
+    for name, signal in bag_dataset(bag).data_vars.items():
+        assert set(signal.attrs) == {"units", "frame", "long_name", "source"}, name
+        assert signal.attrs["units"] and signal.attrs["long_name"] and signal.attrs["source"]
+
+
+def test_units_and_frames_are_those_of_the_topics():
+    groups = [STATE_SIGNALS, ATTITUDE_SIGNALS, RATE_SIGNALS, SURFACE_SIGNALS, THROTTLE_SIGNALS]
+    for topic, signals in zip(LOOP_TOPICS, groups, strict=False):
+        assert {signal.source for signal in signals} == {topic.name}
+        units = topic.units.split(", ")
+        assert [signal.units for signal in signals] == units * (len(signals) // len(units))
+    names = [signal.name for signal in LEARNER_SIGNALS]
+    assert names == [name.replace(".", "_") for name in LEARNER_NAMES]
+
+
+def test_attributes_say_what_flew(bag):
+    flight = bag_dataset(bag)
+    assert flight.attrs["case"] in ("nominal_di", "neuro_adaptive_di")
+    assert flight.attrs["altitude"] == "geopotential"
+    assert json.loads(flight.attrs["notes"])["parameters"]["plant"]["duration"] == 0.5
+
+
+def test_csv_keeps_every_bit(bag):
+    flight = bag_dataset(bag)
+    table = pyarrow.csv.read_csv(io.BytesIO(EXPORTS["csv"](flight)))
+    assert table.column_names[:2] == ["time [s]", "u [m/s]"]
+    for column, signal in zip(table.columns[1:], flight.data_vars.values(), strict=True):
+        assert np.array_equal(column.to_numpy(), signal.values), signal.name
+
+
+def test_parquet_keeps_every_bit_and_the_units(bag):
+    flight = bag_dataset(bag)
+    table = pyarrow.parquet.read_table(io.BytesIO(EXPORTS["parquet"](flight)))
+    assert json.loads(table.schema.metadata[b"notes"])["case"] == flight.attrs["case"]
+    for name, signal in flight.data_vars.items():
+        assert np.array_equal(table[name].to_numpy(), signal.values), name
+        assert table.schema.field(name).metadata[b"units"].decode() == signal.attrs["units"]
+
+
+def test_netcdf_keeps_everything(bag, tmp_path):
+    flight = bag_dataset(bag)
+    (tmp_path / "flight.nc").write_bytes(EXPORTS["netcdf"](flight))
+    with xarray.open_dataset(tmp_path / "flight.nc", engine="scipy") as read:
+        assert read.identical(flight)
