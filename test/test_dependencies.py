@@ -20,6 +20,7 @@ PYTHON = {
     "catkin_pkg": ("catkin_pkg", "python3-catkin-pkg-modules"),
     "distributed": ("distributed", None),
     "hypothesis": ("hypothesis", "python3-hypothesis"),
+    "jinja2": ("jinja2", "python3-jinja2"),
     "llvmlite": ("numba", None),  # its compiler
     "markdown_it": ("markdown-it-py", None),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
@@ -28,6 +29,7 @@ PYTHON = {
     "mpmath": ("mpmath", None),
     "numba": ("numba", None),  # python3-numba is too old for Python 3.12
     "numpy": ("numpy", "python3-numpy"),
+    "playwright": ("playwright", None),
     "pyarrow": ("pyarrow", None),
     "pytest": ("pytest", "python3-pytest"),
     "rich": ("rich", "python3-rich"),
