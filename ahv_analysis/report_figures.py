@@ -33,16 +33,22 @@ DRAWN_EVERY = 10  # steps between the points of a campaign's lines
 
 
 def bag_figures(bag: Path) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
-    """Which figures of the report a bag is for, and how to draw one.
+    """Which figures of the report a bag is for, and how to draw one."""
+    notes = read_notes(bag)
+    case = make_case(notes["case"], notes["parameters"]) if notes else None
+    return flight_figures(read_bag(bag), case)
+
+
+def flight_figures(
+    flown: FlightRecord, case: Case | None
+) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
+    """Which figures of the report a flight is for, and how to draw one.
 
     For an adaptive flight the nominal law is flown from the same start, on the nominal vehicle and
-    on the actual one, with the parameters that the bag holds.
+    on the actual one, with the parameters of its case.
     """
-    flown = read_bag(bag)
-    notes = read_notes(bag)
-    if notes is None or flown.learner is None:
+    if case is None or flown.learner is None:
         return CHAPTER_3, partial(draw, flights={FLOWN: flown})
-    case = make_case(notes["case"], notes["parameters"])
     nominal = case._replace(control=case.control._replace(learner=None))
     ideal = nominal._replace(plant=case.plant._replace(truth=Truth(case.plant.truth.geometric)))
     plates = CHAPTER_4 if case.control.inner.tracking.exponent == 1.0 else CHAPTER_5

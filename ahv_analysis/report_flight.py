@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ahv_analysis.bag_reader import read_bag, read_notes
+from ahv_analysis.bag_reader import flight_of, load_bag, notes_of
 from ahv_analysis.case import Case, make_case
 from ahv_analysis.errors import BagError
 from ahv_analysis.metrics import measure, why_ended_early
@@ -74,7 +74,8 @@ def read_flights(bags: Sequence[Path]) -> list[Flight]:
 
 
 def _read(bag: Path, name: str) -> Flight:
-    record, notes = read_bag(bag), read_notes(bag) or {}
+    loaded = load_bag(bag)
+    record, notes = flight_of(loaded), notes_of(loaded.metadata) or {}
     if record.steps < 1:
         raise BagError(f"{bag} holds no two steps with all their messages: there was no flight")
     case = make_case(notes["case"], notes["parameters"]) if notes else None

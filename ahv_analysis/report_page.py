@@ -15,7 +15,7 @@ from matplotlib import pyplot
 
 from ahv_analysis.case import NODES
 from ahv_analysis.record import Array
-from ahv_analysis.report_figures import bag_figures
+from ahv_analysis.report_figures import flight_figures
 from ahv_analysis.report_flight import Flight
 from ahv_analysis.signals import AXES, CONTROLS, GROUPS, TRACKED, Group, Signal
 from ahv_msgs_py.parameters import Value
@@ -66,6 +66,13 @@ def seconds(value: float | None, never: str = NONE) -> str:
     return never if value is None else f"{value:.2f}".rstrip("0").rstrip(".") + " s"
 
 
+def setting(value: Value | None) -> str:
+    """Write a parameter; a drawn one with six digits."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return NONE if value is None else str(value)
+
+
 def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
     """HTML of a page of the flights, with `figures` as SVG."""
     environment = Environment(
@@ -75,7 +82,7 @@ def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    environment.filters |= {"number": number, "seconds": seconds}
+    environment.filters |= {"number": number, "seconds": seconds, "setting": setting}
     folder = files(__package__) / PAGE
     names = ("page.css", "page.js", "uPlot.min.css", "uPlot.iife.min.js", "uPlot.LICENSE")
     return environment.get_template("page.html").render(
@@ -95,7 +102,7 @@ def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
 
 def draw_figures(flight: Flight) -> list[str]:
     """Draw the report's figures of a flight as SVG."""
-    plates, draw = bag_figures(flight.bag)
+    plates, draw = flight_figures(flight.record, flight.case)
     drawings = []
     for plate in plates:
         figure, drawing = draw(plate), StringIO()

@@ -20,7 +20,7 @@ def versions() -> dict[str, str]:
 
     A package that is not installed is left out: the library engine flies without rclpy.
     """
-    found = {"python": platform.python_version(), "source": source_hash()}
+    found = {}
     for package, names in DISTRIBUTIONS.items():
         for name in names:
             try:
@@ -28,4 +28,4 @@ def versions() -> dict[str, str]:
             except PackageNotFoundError:
                 continue
             break
-    return found
+    return found | {"python": platform.python_version(), "source": source_hash()}
