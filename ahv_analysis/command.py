@@ -26,8 +26,8 @@ from ahv_analysis.console import (
     show_table,
 )
 from ahv_analysis.faults_command import faults
-from ahv_analysis.report import report
 from ahv_analysis.replay_command import replay
+from ahv_analysis.report import report
 from ahv_plant.constants import DEGREES, INITIAL_MASS, STEP
 from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED
 
@@ -157,7 +157,7 @@ def fly(
     record = read_bag(bag)
     summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
     summary["dispersion"] = flight.plant.truth.dispersion._asdict()
-    summary |= summarize(record, ended_early)
+    summary |= summarize(record, ended_early, flight.control)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
     if as_json:
@@ -204,8 +204,10 @@ def _print_summary(summary: dict[str, Any]) -> None:
     low, high = summary["surface_range_deg"]
     least, most = summary["throttle_range"]
     verdict = "success" if summary["success"] else "FAILURE"
+    cause = "" if summary["success"] else summary["cause"].replace("_", " ")
+    why = cause, summary["ended_early"] or "flown to its end"
     rows = [
-        ("verdict", f"{verdict}: {summary['ended_early'] or 'flown to its end'}"),
+        ("verdict", f"{verdict}: {', '.join(filter(None, why))}"),
         ("largest |alpha|", f"{summary['max_abs_alpha_deg']:.3f} deg (inlet unstart at 5 deg)"),
         ("largest |beta|", f"{summary['max_abs_beta_deg']:.3f} deg"),
         ("surfaces", f"{low:.2f} to {high:.2f} deg (stops at -40 and 30)"),

@@ -55,6 +55,16 @@ def observer_error(state: State, learner: LearnerState) -> float:
 
 
 @elementwise
+def cause_now(state: State, status: int, geometric: bool) -> float:
+    """Cause for which a flight fails at a state whose surfaces were found with `status`."""
+    left = departure(state, geometric)
+    unstart = select(abs(atan_ratio(state.w, state.u)) > UNSTART_ALPHA, 4.0, 0.0)
+    lost = select(status == 3, 3.0, unstart)
+    outside = select(left == 2, 2.0, lost)
+    return select(left == 1, 1.0, outside)
+
+
+@elementwise
 def count_step(
     tally: Tally, state: State, answer: Commands, observed: float, altitude: float, geometric: bool
 ) -> Tally:
@@ -62,13 +72,8 @@ def count_step(
     alpha = abs(atan_ratio(state.w, state.u))
     v = abs(state.v)
     beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more
-    left = departure(state, geometric)
-    unstart = select(alpha > UNSTART_ALPHA, 4.0, 0.0)
-    lost = select(answer.status == 3, 3.0, unstart)
-    outside = select(left == 2, 2.0, lost)
-    now = select(left == 1, 1.0, outside)
     flying = tally.cause == 0.0
-    cause = select(flying, now, tally.cause)
+    cause = select(flying, cause_now(state, answer.status, geometric), tally.cause)
     counts = cause == 0.0
     surfaces = answer.surfaces
     least = -max(-surfaces.right_elevon, -surfaces.left_elevon, -surfaces.rudder)

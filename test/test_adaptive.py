@@ -7,15 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahv_analysis.case import load_case
+from ahv_analysis.case import dispersion_parameters, load_case
 from ahv_analysis.flight import fly
 from ahv_analysis.record import record
 from ahv_control.error_dynamics import ErrorDynamics, decay, error_decay
 from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_demand
 from ahv_control.intermediate_loop import Rates
+from ahv_control.newton_raphson import nominal_response
 from ahv_control.outer_loop import OuterLoop, attitude_command
 from ahv_plant.constants import DEGREES, RADIANS
+from ahv_plant.dispersion import draw_dispersion
 from ahv_plant.elementary import atan
+from ahv_plant.state import Surfaces
 from test.flights import CRUISE, STATES, between
 
 RATES = st.builds(Rates, *[between(-0.3, 0.3)] * 3)
@@ -158,6 +161,34 @@ def test_a_vehicle_whose_trim_unstarts_the_inlet_is_saved_by_protection():
     assert np.max(np.abs(kept.air.alpha)) * DEGREES < 4.6
     assert kept.column("h")[-1] < 23900.0  # lower, and level again
     assert abs(kept.climb_angle[-1]) * DEGREES < 0.3
+
+
+PROTECTED = [f"{name}_protected" for name in ADAPTIVE]
+
+
+@pytest.mark.parametrize("name", PROTECTED)
+def test_a_cautious_start_saves_a_vehicle_that_pitches_up(name):
+    """Run 9 of the campaign of 50 % with the seed 2017: lift up, pitching moment down."""
+    pitching = dispersion_parameters(draw_dispersion(0.5, 2017, 9))
+    case = load_case(name, pitching)
+    learner = case.control.learner._replace(first_estimate=0.0)
+    rash = case._replace(control=case.control._replace(learner=learner))
+    assert not record(fly(rash), False).inlet_started
+    flight, ended_early, _ = flown(name, pitching)
+    assert not ended_early and flight.inlet_started
+    assert np.max(flight.air.alpha) * DEGREES < 4.0
+
+
+@pytest.mark.parametrize("name", PROTECTED)
+def test_a_cautious_start_moves_a_nominal_vehicle_little(name):
+    case = load_case(name, {f"dispersion.{key}": 1.0 for key in HARD} | {"duration": 60.0})
+    flight = record(fly(case), False)
+    alpha = flight.air.alpha * DEGREES
+    assert alpha.min() > 2.6 and alpha.max() < 3.1
+    assert np.max(np.abs(flight.column("h") - 24000.0)) < 100.0
+    first = nominal_response(case.plant.initial, Surfaces(*flight.surfaces[0].tolist()), False)
+    assert flight.surfaces[0, :2] * DEGREES == pytest.approx(-40.0)  # all there is
+    assert -case.control.learner.first_estimate < first.Q * DEGREES < -37.0
 
 
 LATERAL = {"initial.P": 3.0, "initial.R": -3.0, "initial.v": 30.0, "initial.Q": 2.0}

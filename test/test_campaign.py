@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from matplotlib import pyplot
 from scipy.stats import beta
 
 from ahv_analysis.block import fly_alone
@@ -25,13 +27,15 @@ from ahv_analysis.campaign import (
 )
 from ahv_analysis.campaign_store import PART_RUNS, level_folder, part_files
 from ahv_analysis.campaign_summary import exact_interval, summarize_campaign
-from ahv_analysis.case import load_case
+from ahv_analysis.case import config_folder, load_case
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.report_figures import campaign_figures
 from ahv_analysis.table import CONTROLLERS, REPORT, fly_table, markdown
+from ahv_analysis.tally import Cause
 from test.test_command import ahv
 
 RUNS = 150
+AHV = Path(sys.executable).parent / "ahv"
 
 
 def campaign(name="neuro_adaptive_di", level=0.4, runs=RUNS, seed=2, random_starts=False):
@@ -46,6 +50,15 @@ def rows(folder, level=0.4):
 
 def same(one, other):
     return one.keys() == other.keys() and all(np.array_equal(one[key], other[key]) for key in one)
+
+
+def short_case(folder, name, duration):
+    """File of a case with another duration [s]."""
+    text = (config_folder() / "cases" / f"{name}.yaml").read_text()
+    assert "duration: 150.0" in text
+    path = folder / f"short_{name}.yaml"
+    path.write_text(text.replace("duration: 150.0", f"duration: {duration}"))
+    return path
 
 
 def done(result):
@@ -232,6 +245,33 @@ def test_figures_of_a_campaign_with_gaps_mark_the_runs_that_failed():
     assert np.array_equal(draw.keywords["flights"][0].states[0], start.plant.initial)
 
 
+@pytest.mark.parametrize(
+    "name, random_starts, numbers",
+    [
+        ("nominal_di", True, [f"3.{number}" for number in range(8, 14)]),
+        ("neuro_adaptive_di", False, [f"4.{number}" for number in range(6, 11)]),
+        ("neuro_adaptive_sc_gdi", False, [f"5.{number}" for number in range(6, 11)]),
+    ],
+)
+def test_a_campaign_gives_the_report_s_figures_a_line_a_run(name, random_starts, numbers):
+    few = campaign(name, level=0.0 if random_starts else 0.3, random_starts=random_starts)
+    causes = {0: 0, 1: int(Cause.INLET_UNSTART), 2: 0}
+    plates, draw = campaign_figures(few, causes)
+    assert [plate.number for plate in plates] == numbers
+    for plate in plates:
+        figure = draw(plate)
+        assert f"Figure {plate.number}" in figure.get_suptitle()
+        for panel, axis in zip(plate.panels, figure.axes, strict=True):
+            lines = [line for line in axis.lines if len(line.get_xdata()) > 2]
+            assert [line.get_color() for line in lines] == ["C0", "C3", "C0"]
+            assert lines[1].get_zorder() > lines[0].get_zorder()
+            for run, line in enumerate(lines):
+                flight = draw.keywords["flights"][run]
+                assert np.array_equal(line.get_ydata(), panel.values(flight))
+                assert line.get_xdata()[-1] == 20.0
+        pyplot.close(figure)
+
+
 def damaged(path, kind):
     if kind == "no parquet":
         path.write_text("hello")
@@ -300,16 +340,30 @@ def test_the_table_has_the_report_s_counts(tmp_path):
     assert "| 99.39 | [99.08, 99.6" in text and "| 89.21 | [88.19, 90.1" in text
 
 
-def test_dask_flies_the_same_campaign_and_outlives_a_worker(flown, tmp_path):
-    from distributed import Client, LocalCluster
+@pytest.fixture(scope="module")
+def cluster():
+    from distributed import LocalCluster
 
-    with (
-        LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
-        ) as cluster,
-        Client(cluster) as client,
-        client.get_executor(pure=False, retries=10) as pool,
-    ):
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
+    ) as cluster:
+        yield cluster
+
+
+def test_the_command_flies_the_same_campaign_on_a_dask_cluster(flown, cluster, tmp_path):
+    case = short_case(tmp_path, "neuro_adaptive_di", "20.0")
+    command = ("monte-carlo", "--controller", case, "--level", 0.4, "--runs", RUNS, "--seed", 2)
+    out = tmp_path / "campaign"
+    result = ahv(*command, "--dask", cluster.scheduler_address, "--out", out, "--json")
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["runs"] == RUNS
+    assert same(rows(out), flown[0])
+
+
+def test_dask_outlives_a_worker(flown, cluster, tmp_path):
+    from distributed import Client
+
+    with Client(cluster) as client, client.get_executor(pure=False, retries=10) as pool:
         victim = next(iter(cluster.workers.values()))
         killed = []
 
@@ -358,21 +412,18 @@ def test_a_run_can_be_flown_on_the_graph(tmp_path):
 
 
 def test_ctrl_c_keeps_what_was_flown(tmp_path):
-    out = tmp_path / "campaign"
-    process = subprocess.Popen(
-        [Path(sys.executable).parent / "ahv", "monte-carlo", "--runs", "20000", "--out", str(out)],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    out, case = tmp_path / "campaign", short_case(tmp_path, "nominal_di", "1.0")
+    command = (AHV, "monte-carlo", "--controller", case, "--runs", "9000000", "--out", out)
+    process = subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60
-    while not (out / "runs-0.3").exists() and time.monotonic() < deadline:
+    while not part_files(out / "runs-0.3") and time.monotonic() < deadline:
         time.sleep(0.1)
-    time.sleep(3.0)  # some jobs
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "resumes" in errors and "Traceback" not in errors
-    assert len(rows(out, 0.3)["run"]) >= 64
+    kept = int(re.search(r"after (\d+) of 9000000", errors)[1])
+    assert len(rows(out, 0.3)["run"]) >= kept >= PART_RUNS
 
 
 @pytest.mark.parametrize(

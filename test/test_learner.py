@@ -272,6 +272,13 @@ def test_a_surface_at_its_stop_does_not_wind_the_learner_up():
 
 def test_weights_of_a_fresh_learner_estimate_nothing():
     learner = start_learner(Rates(0.1, 0.2, 0.3))
+    assert learner == start_learner(Rates(0.1, 0.2, 0.3), 0.0)
     assert learner.X_a == learner.X_d == (0.1, 0.2, 0.3)
     assert disturbance_estimate(learner, Rates(0.1, 0.2, 0.3)) == (0.0, 0.0, 0.0)
     assert dot(Basis(one=2.0, Q=3.0), Basis(one=5.0, Q=7.0, R=11.0)) == 31.0
+
+
+@given(st.tuples(*[between(-0.2, 0.2)] * 3), between(-100.0, 100.0))
+def test_a_first_estimate_is_of_the_pitch_channel_alone_at_any_rates(rates, first):
+    estimate = disturbance_estimate(start_learner(Rates(0.0, 0.0, 0.0), first), Rates(*rates))
+    assert estimate == (0.0, pytest.approx(first * RADIANS), 0.0)
