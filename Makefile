@@ -42,6 +42,7 @@ docs: venv
 
 bench: venv
 	@$(BIN)/python -m test.benchmark
+	@$(BIN)/python -m test.benchmark_realtime
 
 venv: $(READY)
 

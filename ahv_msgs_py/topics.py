@@ -1,10 +1,10 @@
 """The topics of the graph: names, message types, layouts, units and frames.
 
 Frames: `base_link_frd` are body axes forward-right-down, `map_ned` is the flat Earth
-north-east-down (REP-103 suffixes). Quality of service, the same for all: reliable, transient
-local, keep a whole flight. Every answer carries the stamp of the state that it answers; transient
-local gives a node that joins late what it missed: no order of starting loses a step, and a
-recorder that is late or slow gets everything.
+north-east-down (REP-103 suffixes). Every answer carries the stamp of the state that it answers.
+Quality of service in lockstep: reliable, transient local, the last 200 s of flight kept, so that a
+node that joins late gets what it missed, and a recorder that is slow gets everything. In real time:
+reliable, volatile, short queues, for old messages would not be obeyed.
 """
 
 from sys import float_info
@@ -15,7 +15,7 @@ from ahv_msgs_py.layout import Layout, NamedVector, StampedAcceleration, Stamped
 NAMESPACE = "/ahv"
 BODY_FRAME = "base_link_frd"
 EARTH_FRAME = "map_ned"
-QUEUE_DEPTH = 400_000  # messages kept per topic, sender and receiver: the longest flight
+QUEUE_DEPTH = 20_000  # messages kept per topic, sender and receiver: 200 s of flight
 
 STATE_NAMES = ("u", "v", "w", "P", "Q", "R", "phi", "theta", "psi", "x", "y", "h", "mass")
 BASIS_NAMES = ("one", "P", "P2", "Q", "Q2", "P2Q2", "R", "R2", "P2R2", "Q2R2", "P2Q2R2")

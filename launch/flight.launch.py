@@ -1,9 +1,11 @@
 """Fly one case on the graph, a process per node, until the plant ends the flight.
 
-    ros2 launch ahv flight.launch.py case:=nominal_di bag:=flights/first
+    ros2 launch ahv flight.launch.py case:=nominal_di out:=flights/first
 
-`ros2 launch ahv flight.launch.py --show-args` lists the arguments. A node that ends before its
-time, as one that refuses a parameter does, ends the launch.
+`ros2 launch ahv flight.launch.py --show-args` lists the arguments. The nodes come up in order: the
+recorder, the controllers, then the plant, which starts to fly when all of them listen. A node that
+ends before its time, as one that refuses a parameter does, ends the launch; in real time a
+controller is started again instead, and the flight goes on.
 """
 
 from pathlib import Path
@@ -18,48 +20,65 @@ from launch_ros.actions import Node
 CONTROLLERS = ("outer_intermediate", "inner_loop", "velocity")
 LEARNER = "disturbance_learner"  # flies with the cases whose inner loop is adaptive
 DRAIN = 2.0  # [s] for the recorder to take what is still under way
+ARGUMENTS = {
+    "case": ("nominal_di", "Name of a case in share/ahv/config/cases, or path of a YAML file."),
+    "dispersion": ("", "YAML file of the vehicle's dispersion; that of the case, if empty."),
+    "realtime": ("false", "true: 100 Hz by the wall clock; false: lockstep, as fast as it goes."),
+    "record": ("true", "Whether a recorder flies along."),
+    "out": ("flight", "Folder for the bag, which must not have one: OUT/bag."),
+    "autostart": ("true", "false: the nodes wait for `ros2 lifecycle set NODE configure`."),
+}
 
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments; the nodes follow when their values are known."""
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument(
-                "case",
-                default_value="nominal_di",
-                description="Name of a case in share/ahv/config/cases, or path of a YAML file.",
-            ),
-            DeclareLaunchArgument(
-                "bag",
-                default_value="bag",
-                description="Folder of the bag to record to; it must not exist.",
-            ),
-            OpaqueFunction(function=_nodes),
-        ]
-    )
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=description)
+        for name, (default, description) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])
 
 
 def _nodes(context: LaunchContext) -> list[Node]:
-    case = _case_file(LaunchConfiguration("case").perform(context))
-    bag = str(Path(LaunchConfiguration("bag").perform(context)).expanduser().resolve())
+    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    case = _case_file(given["case"])
+    realtime, record = _truth(given, "realtime"), _truth(given, "record")
+    shell = {"realtime": realtime, "autostart": _truth(given, "autostart")}
     controllers = (*CONTROLLERS, LEARNER) if _adaptive(case) else CONTROLLERS
+    plant = [_file(given["dispersion"])] if given["dispersion"] else []
+    plant += [shell | {"listeners": len(controllers) + record}]
+    bag = str(Path(given["out"]).expanduser().resolve() / "bag")
     over = TimerAction(period=DRAIN, actions=[Shutdown(reason="the flight is over")])
-    return [
-        _node("recorder", case, {"bag": bag}, Shutdown(reason="the recorder ended")),
-        *(_node(name, case, {}, Shutdown(reason=f"{name} ended")) for name in controllers),
-        _node("plant", case, {"listeners": len(controllers) + 1}, over),
-    ]
+    nodes = []
+    if record:
+        # in real time a flight goes on without its recorder
+        end = {} if realtime else {"on_exit": Shutdown(reason="the recorder ended")}
+        nodes += [_node("recorder", [case, shell | {"bag": bag}], **end)]
+    for name in controllers:
+        end = {"respawn": True} if realtime else {"on_exit": Shutdown(reason=f"{name} ended")}
+        nodes += [_node(name, [case, shell], **end)]
+    return [*nodes, _node("plant", [case, *plant], on_exit=over)]
+
+
+def _truth(given: dict[str, str], name: str) -> bool:
+    """Value of an argument that is true or false."""
+    if given[name].lower() not in ("true", "false"):
+        raise ValueError(f"{name} is {given[name]!r}, but must be true or false")
+    return given[name].lower() == "true"
 
 
 def _case_file(case: str) -> str:
     """Path of the parameter file of a case."""
     if Path(case).suffix in (".yaml", ".yml"):
-        file = Path(case).expanduser().resolve()
-    else:
-        share = Path(get_package_share_directory("ahv"))
-        file = share / "config" / "cases" / f"{case}.yaml"
+        return _file(case)
+    share = Path(get_package_share_directory("ahv"))
+    return _file(str(share / "config" / "cases" / f"{case}.yaml"))
+
+
+def _file(name: str) -> str:
+    file = Path(name).expanduser().resolve()
     if not file.is_file():
-        raise FileNotFoundError(f"case {case!r}: there is no file {file}")
+        raise FileNotFoundError(f"there is no file {file}")
     return str(file)
 
 
@@ -69,14 +88,14 @@ def _adaptive(case: str) -> bool:
     return any(body["ros__parameters"].get("adaptive") for body in sections.values())
 
 
-def _node(name: str, case: str, parameters: dict, on_exit: object) -> Node:
+def _node(name: str, parameters: list[object], **options: object) -> Node:
     # name and namespace make launch file the parameters under the node, where they win
     return Node(
         package="ahv",
         executable=name,
         name=name,
         namespace="/ahv",
-        parameters=[case, parameters] if parameters else [case],
+        parameters=parameters,
         output="screen",
-        on_exit=on_exit,
+        **options,
     )

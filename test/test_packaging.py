@@ -142,24 +142,45 @@ def launch(monkeypatch):
     return lambda **given: {node.name: node for node in start.function(defaults | given)}
 
 
+LOCKSTEP = {"realtime": False, "autostart": True}
+
+
 def test_launch_starts_a_process_per_node_from_one_case(launch, setup):
-    nodes = launch(bag="flights/one")
+    nodes = launch(out="flights/one")
     assert set(nodes) == {"recorder", "plant", *CONTROLLERS} <= set(executables(setup))
+    assert next(iter(nodes)) == "recorder" and list(nodes)[-1] == "plant"
     for name, node in nodes.items():
         assert (node.package, node.executable, node.namespace) == ("ahv", name, "/ahv")
         assert node.parameters[0] == str(ROOT / "config" / "cases" / "nominal_di.yaml")
-    assert nodes["recorder"].parameters[1:] == [{"bag": str(Path("flights/one").resolve())}]
-    assert nodes["plant"].parameters[1:] == [{"listeners": 4}]
+    bag = str(Path("flights/one/bag").resolve())
+    assert nodes["recorder"].parameters[1:] == [LOCKSTEP | {"bag": bag}]
+    assert nodes["plant"].parameters[1:] == [LOCKSTEP | {"listeners": 4}]
+    assert all(hasattr(node, "on_exit") for node in nodes.values())
 
 
 def test_launch_adds_the_learner_to_adaptive_cases(launch):
     nodes = launch(case="neuro_adaptive_di")
     assert set(nodes) == {"recorder", "plant", "disturbance_learner", *CONTROLLERS}
-    assert nodes["plant"].parameters[1:] == [{"listeners": 5}]
+    assert nodes["plant"].parameters[1:] == [LOCKSTEP | {"listeners": 5}]
+
+
+def test_launch_in_real_time_starts_controllers_again(launch, tmp_path):
+    dispersion = tmp_path / "vehicle.yaml"
+    dispersion.write_text("/ahv/plant: {ros__parameters: {dispersion: {CL: 1.1}}}")
+    nodes = launch(realtime="true", record="false", dispersion=str(dispersion))
+    assert set(nodes) == {"plant", *CONTROLLERS}
+    assert all(nodes[name].respawn for name in CONTROLLERS)
+    assert nodes["plant"].parameters[1] == str(dispersion)
+    assert nodes["plant"].parameters[2] == LOCKSTEP | {"realtime": True, "listeners": 3}
+
+
+def test_launch_names_what_is_neither_true_nor_false(launch):
+    with pytest.raises(ValueError, match="realtime is 'maybe'"):
+        launch(realtime="maybe")
 
 
 def test_launch_takes_a_file_and_names_one_that_is_not_there(launch):
     file = ROOT / "config" / "cases" / "nominal_di.yaml"
     assert launch(case=str(file))["plant"].parameters[0] == str(file)
-    with pytest.raises(FileNotFoundError, match=r"case 'typo': there is no file .*typo\.yaml"):
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*typo\.yaml"):
         launch(case="typo")

@@ -1,0 +1,103 @@
+"""Real time for minutes and lockstep for an hour of flight: `make bench`."""
+
+import argparse
+import os
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+from ahv_analysis.bag_reader import load_bag
+from ahv_analysis.case import load_case
+from ahv_analysis.graph_flight import fly_graph
+from ahv_analysis.process_flight import ProcessGraph, Watcher, set_transport
+from ahv_msgs_py.topics import STATE
+
+CASE = "neuro_adaptive_sc_gdi"
+TICK = os.sysconf("SC_CLK_TCK")  # [1/s] of the counters of processor time
+PAGE = os.sysconf("SC_PAGE_SIZE")  # [B]
+
+
+def processor_seconds(pid: int) -> float:
+    """Processor time that a process has taken [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICK
+
+
+def resident(pid: int | str = "self") -> float:
+    """Memory of a process [MB]."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE / 1e6
+
+
+def bench_realtime(seconds: int) -> None:
+    """State to both commands at 100 Hz, a process per node, recorder on."""
+    set_transport(realtime=True)
+    case = load_case(CASE, {"duration": float(seconds)})
+    watcher = Watcher()
+    with tempfile.TemporaryDirectory() as folder:
+        bag = Path(folder) / "bag"
+        with ProcessGraph(case, bag, realtime=True) as graph:
+            while watcher.step < 0:
+                watcher.look(0.1)
+            before = {n: processor_seconds(p.pid) for n, p in graph.processes.items()}
+            started = time.perf_counter()
+            used = before
+            while watcher.over is None:
+                watcher.look(0.5)
+                alive = [n for n, p in graph.processes.items() if p.exitcode is None]
+                used = used | {n: processor_seconds(graph.processes[n].pid) for n in alive}
+            wall = time.perf_counter() - started
+        states = len(load_bag(bag).topics[STATE.name].messages)
+    facts = watcher.over
+    watcher.close()
+    share = {name: (used[name] - before[name]) / wall for name in used}
+    print(f"{CASE}: {seconds} s at 100 Hz, one process per node, recorder on")
+    print(
+        f"state to both commands, ms    p50 {facts['latency_ms_p50']}  "
+        f"p99 {facts['latency_ms_p99']}  max {facts['latency_ms_max']}"
+    )
+    print(
+        f"of {facts['steps']} steps                 {facts.get('late', 0)} commands late, "
+        f"{facts.get('tick_missed', 0)} ticks missed; {states} states in the bag"
+    )
+    parts = ", ".join(f"{name} {100 * part:.1f}" for name, part in share.items())
+    print(f"of one core                   {100 * sum(share.values()):.1f} % ({parts})")
+    print(f"load of the machine           {os.getloadavg()[0]:.2f}\n")
+
+
+def soak(seconds: int) -> None:
+    """An hour of flight in lockstep: memory and pace at every tenth of it."""
+    case = load_case(CASE, {"duration": float(seconds)})
+    steps = case.plant.steps
+    marks: list[tuple[int, float, float]] = []
+
+    def look(step: int) -> None:
+        if step >= (len(marks) + 1) * steps // 10:
+            marks.append((step, time.perf_counter(), resident()))
+
+    started = time.perf_counter()
+    ended_early, wall = fly_graph(case, None, progress=look)
+    print(f"{CASE}: {steps} steps in lockstep, one process, {ended_early or 'flown to the end'}")
+    print("     steps    steps/s   memory MB")
+    last = (0, started)
+    for step, now, memory in marks:
+        print(f"{step:10} {(step - last[0]) / (now - last[1]):10.0f} {memory:11.1f}")
+        last = (step, now)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    print(f"{steps / wall:.0f} steps/s in all, peak memory {peak:.0f} MB\n")
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--realtime", type=int, default=600, metavar="SECONDS")
+    parser.add_argument("--soak", type=int, default=3600, metavar="SECONDS")
+    chosen = parser.parse_args()
+    if chosen.realtime:
+        bench_realtime(chosen.realtime)
+    if chosen.soak:
+        soak(chosen.soak)
+
+
+if __name__ == "__main__":
+    main()
