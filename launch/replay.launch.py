@@ -13,23 +13,37 @@ from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-ARGUMENTS = {
-    "bag": "Folder of the bag to replay.",
-    "nodes": "Controllers to replay, separated by spaces; all that the flight had, if empty.",
-    "parameters": "Case (name or YAML file) to replay with; that of the flight, if empty.",
-    "rate": "Pace in times real time; as fast as possible and unseen by tools, if empty.",
-    "out": "Folder for figures of recorded and replayed commands; no figures, if empty.",
-}
-DEFAULTS = {"nodes": "", "parameters": "", "rate": "1.0", "out": ""}
+ARGUMENTS = ("bag", "nodes", "parameters", "rate", "out")
 
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments; the replay follows when their values are known."""
-    arguments = [
-        DeclareLaunchArgument(name, default_value=DEFAULTS.get(name), description=description)
-        for name, description in ARGUMENTS.items()
-    ]
-    return LaunchDescription([*arguments, OpaqueFunction(function=_replay)])
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument("bag", description="Folder of the bag to replay."),
+            DeclareLaunchArgument(
+                "nodes",
+                default_value="",
+                description="Controllers to replay, separated by spaces; if empty, all.",
+            ),
+            DeclareLaunchArgument(
+                "parameters",
+                default_value="",
+                description="Case to replay with, name or YAML file; if empty, the flown one.",
+            ),
+            DeclareLaunchArgument(
+                "rate",
+                default_value="1.0",
+                description="Pace in times real time; if empty, as fast as possible and unseen.",
+            ),
+            DeclareLaunchArgument(
+                "out",
+                default_value="",
+                description="Folder for figures of all commands; if empty, none are drawn.",
+            ),
+            OpaqueFunction(function=_replay),
+        ]
+    )
 
 
 def _replay(context: LaunchContext) -> list[ExecuteProcess]:

@@ -87,7 +87,7 @@ def test_wheel_carries_what_ros_looks_for(setup, tmp_path):
     expected = ["ament_index/resource_index/packages/ahv", "ahv/package.xml"]
     expected += [f"ahv/config/cases/{case}.yaml" for case in case_names()]
     expected += [f"ahv/config/viewers/{path.name}" for path in ROOT.glob("config/viewers/*")]
-    expected += ["ahv/launch/flight.launch.py"]
+    expected += ["ahv/launch/flight.launch.py", "ahv/launch/replay.launch.py"]
     assert {f"{data}/share/{name}" for name in expected} <= set(modes)
     assert {f"ahv_analysis/page/{path.name}" for path in ROOT.glob("*/page/*")} <= set(modes)
     assert not [name for name in modes if name.startswith("test")]

@@ -412,9 +412,10 @@ def launch(monkeypatch):
         monkeypatch.setitem(sys.modules, name, module)
     description = runpy.run_path(str(ROOT / "launch" / "replay.launch.py"))
     *arguments, start = description["generate_launch_description"]().values[0]
-    defaults = {argument.values[0]: argument.default_value for argument in arguments}
+    bag, *optional = arguments
+    assert (bag.values, hasattr(bag, "default_value")) == (("bag",), False)  # must be given
+    defaults = {argument.values[0]: argument.default_value for argument in optional}
     assert all(argument.description for argument in arguments)
-    assert defaults["bag"] is None  # must be given
 
     def run(**given):
         (process,) = start.function(defaults | given)
