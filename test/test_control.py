@@ -26,6 +26,7 @@ from ahv_plant.constants import (
     THROTTLE_MINIMUM,
 )
 from ahv_plant.dispersion import NOMINAL
+from ahv_plant.safe_command import safe_surfaces
 from ahv_plant.state import Surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import CRUISE, STATES, SURFACES, between, degrees
@@ -170,3 +171,11 @@ def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous)
     surfaces = nominal_surfaces(state, answer.rates, previous, inner)
     assert (answer.surfaces, answer.status) == surfaces
     assert answer.throttle == throttle_command(state, answer.surfaces, velocity)
+
+
+@given(SURFACES)
+def test_the_safe_command_keeps_the_pitching_elevons_and_turns_nothing(held):
+    safe = safe_surfaces(held)
+    assert safe.right_elevon == safe.left_elevon
+    assert safe.right_elevon + safe.left_elevon == pytest.approx(sum(held[:2]), abs=1e-15)
+    assert safe.rudder == 0.0

@@ -12,6 +12,8 @@ from ahv_msgs_py.layout import MessageError, NamedVector
 from ahv_msgs_py.stepwise import RealTimeSteps
 from ahv_msgs_py.topics import SURFACE_COMMAND
 
+pytestmark = pytest.mark.unit
+
 VALUES = (-0.1, -0.1, 0.0)
 LAYOUT = SURFACE_COMMAND.layout
 

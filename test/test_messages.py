@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from ahv_control.disturbance_learner import Basis, start_learner
 from ahv_control.intermediate_loop import Rates
-from ahv_control.learner_message import estimate_values, learned_of, learner_values
+from ahv_control.learner_message import estimate_values, learned_of, learner_values, unlearned
 from ahv_msgs_py.base_node import message_class
 from ahv_msgs_py.layout import MessageError, clock_bytes
 from ahv_msgs_py.topics import (
@@ -67,6 +67,12 @@ def test_the_learner_comes_back_from_its_messages():
     assert estimate_values(learned.estimate) == (0.0, 0.0, 0.0, 7.0, 8.0, 9.0)
 
 
+def test_without_a_learner_the_observers_are_at_the_state():
+    state = State(*range(len(STATE_NAMES)))
+    rates = Rates(state.P, state.Q, state.R)
+    assert unlearned(state, (0.0, 0.0, 0.0, 7.0, 8.0, 9.0)) == (rates, rates, (7.0, 8.0, 9.0))
+
+
 @TOPICS
 @given(stamp=STAMPS, data=st.data())
 def test_every_bit_comes_back(topic, stamp, data):
@@ -74,6 +80,17 @@ def test_every_bit_comes_back(topic, stamp, data):
     found_stamp, found = topic.layout.decode(topic.layout.encode(stamp, values))
     assert found_stamp == stamp
     assert bits(found) == bits(values)
+
+
+@TOPICS
+def test_many_messages_are_read_as_one_by_one(topic):
+    size = len(topic.layout.fields)
+    sent = [(stamp, tuple(0.1 * stamp + i for i in range(size))) for stamp in (0, 7, 10**10)]
+    data = [topic.layout.encode(*message) for message in sent]
+    spoilt = bytes([data[0][0] ^ 1]) + data[0][1:]
+    stamps, values, places = topic.layout.decode_all([data[0], b"", spoilt, *data[1:]])
+    assert list(zip(stamps.tolist(), map(tuple, values.tolist()), strict=True)) == sent
+    assert places.tolist() == [0, 3, 4]
 
 
 @TOPICS
