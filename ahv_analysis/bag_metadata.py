@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import yaml
 from mcap.records import Channel, Metadata, Schema
+from rosbags.rosbag2.errors import ReaderError
 from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 
 from ahv_analysis.errors import BagError
@@ -17,6 +18,7 @@ DISTRO = "jazzy"
 RECORD = "rosbag2"  # name of the metadata record of an MCAP file, and its key
 _YamlLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _TEXT = "serialized_metadata"
+NOTES = "ahv"  # key of the notes of a flight in the custom data
 QOS_KEY, HASH_KEY = "offered_qos_profiles", "topic_type_hash"  # of a channel's metadata
 
 
@@ -74,7 +76,7 @@ def bag_metadata(files: Sequence[BagFile], custom: Mapping[str, str]) -> dict[st
                     "name": topic.name,
                     "type": topic.type_name,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": dump_qos_v9(parse_qos(topic.qos)),
+                    "offered_qos_profiles": _profiles(topic.qos),
                     "type_description_hash": topic.type_hash,
                 },
                 "message_count": count,
@@ -98,6 +100,14 @@ def bag_metadata(files: Sequence[BagFile], custom: Mapping[str, str]) -> dict[st
     }
 
 
+def _profiles(qos: str) -> list[Any]:
+    """Quality of service of a channel as metadata.yaml has it; nothing of what nobody can read."""
+    try:
+        return list(dump_qos_v9(parse_qos(qos)))
+    except (ReaderError, KeyError, TypeError, ValueError, AttributeError):
+        return []
+
+
 def metadata_record(metadata: Mapping[str, Any]) -> Metadata:
     """Metadata of a bag as a record of its MCAP file: what a bag without metadata.yaml has."""
     return Metadata(RECORD, {_TEXT: _text(metadata)})
@@ -106,7 +116,7 @@ def metadata_record(metadata: Mapping[str, Any]) -> Metadata:
 def custom_of_record(record: Metadata) -> dict[str, str]:
     """Texts of ours in such a record; none where another program wrote it, or nothing."""
     try:
-        return dict(yaml.safe_load(record.metadata[_TEXT])["custom_data"] or {})
+        return dict(yaml.load(record.metadata[_TEXT], _YamlLoader)["custom_data"] or {})
     except (yaml.YAMLError, KeyError, TypeError, ValueError):
         return {}
 
@@ -126,7 +136,7 @@ def read_metadata(path: Path) -> dict[str, Any]:
         metadata: dict[str, Any] = content["rosbag2_bagfile_information"]
         storage, files = metadata["storage_identifier"], metadata["relative_file_paths"]
         names = [Path(name).name for name in files]
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError) as error:
+    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise BagError(f"{file} is not the metadata of a bag: {reason}") from error
     if storage != "mcap":

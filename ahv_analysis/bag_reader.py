@@ -11,8 +11,7 @@ import zstandard
 from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
-from ahv_analysis.bag_metadata import read_metadata
-from ahv_analysis.bag_writer import NOTES
+from ahv_analysis.bag_metadata import NOTES, read_metadata
 from ahv_analysis.errors import BagError
 from ahv_analysis.mcap_scan import HEAD, Block, Damage, Piece, scan
 from ahv_analysis.record import Array, FlightRecord
@@ -153,7 +152,7 @@ def notes_of(metadata: dict[str, Any]) -> dict[str, Any] | None:
     except (ValueError, KeyError, TypeError):
         return None  # a recorder of somebody else's, or none of our notes
     ours = isinstance(notes, dict) and {"case", "parameters"} <= notes.keys()
-    return notes if ours else None
+    return notes if ours and {"plant", "inner_loop"} <= notes["parameters"].keys() else None
 
 
 def _decompressed(data: bytes) -> bytes:
@@ -185,7 +184,7 @@ def _series(bag: Bag, topic: LoopTopic) -> tuple[NDArray[np.int64], Array]:
     stamps, first, again = np.unique(stamps, return_index=True, return_inverse=True)
     if len(first) < len(messages) and values[first][again].tobytes() != values.tobytes():
         raise BagError(
-            f"{bag.path} holds more than one flight: "
+            f"{bag.path} holds more than one flight, or messages of another publisher: "
             f"two messages on {topic.name} differ and have one stamp"
         )
     return stamps, values[first]
@@ -197,11 +196,18 @@ def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:
     By rclpy and not by rosbags, which refuses the surplus bytes that rclpy leaves behind the end;
     only such a bag needs ROS to be read.
     """
-    from rclpy.serialization import deserialize_message
+    try:
+        import rclpy
+        from rclpy.serialization import deserialize_message
 
-    from ahv_msgs_py.base_node import message_class
-
-    return topic.layout.values_of(deserialize_message(data, message_class(topic.layout.type_name)))
+        from ahv_msgs_py.base_node import message_class
+    except ModuleNotFoundError as error:
+        raise MessageError("a message of another sender, which only ROS can read") from error
+    try:
+        message = deserialize_message(data, message_class(topic.layout.type_name))
+    except rclpy._rclpy_pybind11.RMWError as error:
+        raise MessageError("a message whose bytes are none of the topic's type") from error
+    return topic.layout.values_of(message)
 
 
 def _geometric(bag: Bag) -> bool:

@@ -95,7 +95,8 @@ def recover(path: Path, out: Path) -> Recovery | None:
         what = "; ".join(f"{loss.file}: {loss.what}" for loss in losses)
         raise BagError(f"{path} holds no message that can be read ({what})")
     recovery = Recovery(messages, expected and expected - messages, losses)
-    custom = dict(metadata.get("custom_data") or {})
+    custom = metadata.get("custom_data")
+    custom = dict(custom) if isinstance(custom, dict) else {}
     for file in found:
         custom = file.custom | custom
     custom[RECOVERED] = json.dumps(recovery.as_json())

@@ -1,5 +1,6 @@
 """Writing a bag: message bytes as they come, on disk a tenth of a second later at the latest."""
 
+import shutil
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.metadata import version
@@ -24,6 +25,7 @@ from rosbags.interfaces import (
 from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag_metadata import (
+    NOTES,
     BagFile,
     Topic,
     bag_metadata,
@@ -48,7 +50,6 @@ _QOS = Qos(
     _FOREVER,
     False,
 )
-NOTES = "ahv"  # key of the notes in the bag's custom data
 PERIOD = 0.1  # [s] of wall time between chunks
 LONGEST = 1000  # messages of a topic in one chunk: what a damaged chunk takes with it
 _STAMP = np.dtype([("seconds", "<i4"), ("nanoseconds", "<u4")])
@@ -89,8 +90,12 @@ class BagWriter:
         self._topics: dict[int, Topic] = {}
         try:
             path.mkdir(parents=True)
-            self._file = McapFile(path / self._name, f"ahv {version('ahv')}")
-            self._begin()
+            try:
+                self._file = McapFile(path / self._name, f"ahv {version('ahv')}")
+                self._begin()
+            except OSError:
+                shutil.rmtree(path)  # it was made here
+                raise
         except FileExistsError as error:
             raise BagError(f"cannot write a bag to {path}: it exists already") from error
         except OSError as error:
@@ -191,9 +196,8 @@ class BagWriter:
         """Log times (n,) [ns] of the messages `data` (n, length)."""
         if offset is None or data.shape[1] < offset + _STAMP.itemsize:
             return np.full(len(data), self.now, np.uint64)
-        fields = np.ascontiguousarray(data[:, offset : offset + _STAMP.itemsize]).view(_STAMP)[
-            :, 0
-        ]
+        stamp = np.ascontiguousarray(data[:, offset : offset + _STAMP.itemsize])
+        fields = stamp.view(_STAMP)[:, 0]
         stamps = fields["seconds"].astype(np.int64) * NANOSECONDS + fields["nanoseconds"]
         self.now = max(self.now, int(stamps.max()))
         return np.maximum(stamps, 0).astype(np.uint64)
@@ -206,7 +210,7 @@ def _rows(channel: int, messages: Sequence[bytes], length: int) -> NDArray[np.vo
     rows["length"] = rows.itemsize - 9
     rows["channel"] = channel
     rows["sequence"] = 0
-    rows["data"] = np.frombuffer(b"".join(messages), np.uint8).reshape(-1, length)
+    rows["data"] = np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), length)
     return rows
 
 

@@ -15,17 +15,19 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from ahv_analysis.bag_reader import read_bag
 from ahv_analysis.block import fly_alone, fly_block
 from ahv_analysis.campaign import Campaign, fly_campaign
 from ahv_analysis.case import load_case
-from ahv_analysis.flight import fly
+from ahv_analysis.dataset import bag_dataset
+from ahv_analysis.flight import fly, fly_library
 from ahv_analysis.graph_flight import fly_graph
 from ahv_analysis.table import REPORT
 from ahv_plant.compiled import kernel
 from ahv_plant.constants import STEP
 from ahv_plant.lanes import FLOATS, LANES, load, store
 
-ROUNDS = 3
+ROUNDS = 5
 TRIALS = 2048
 
 # Counts the additions, multiplications and divisions of one step of one run, in plain Python.
@@ -145,6 +147,26 @@ def bench_graph() -> None:
             pace = f"{steps / wall:10.0f}{steps * STEP / wall:13.1f}"
             blank = engine == "plain Python reference"
             print(f"{engine:24}{wall:8.2f}{'' if blank else pace:>23}{wall / reference:13.2f}")
+        pairs = zip(walls["graph, no recorder"], walls["graph, recorder on"], strict=True)
+        costs = [1.0 - alone / recorded for alone, recorded in pairs]
+        print(
+            f"recording costs {median(costs):.0%} of the rate without it, median of pairs "
+            f"({min(costs):.0%} to {max(costs):.0%})"
+        )
+
+
+def bench_bags() -> None:
+    """Reading the bag of a flight of 150 s."""
+    print(f"\nbag of 150 s, read whole: s, median of {ROUNDS}")
+    for name in ("nominal_di", "neuro_adaptive_sc_gdi"):
+        with tempfile.TemporaryDirectory() as folder:
+            bag = Path(folder) / "bag"
+            fly_library(load_case(name), bag)
+            bag_dataset(bag)  # compiles, imports
+            arrays = median([timed(lambda: read_bag(bag)) for _ in range(ROUNDS)])  # noqa: B023
+            dataset = median([timed(lambda: bag_dataset(bag)) for _ in range(ROUNDS)])  # noqa: B023
+            size = next(bag.glob("*.mcap")).stat().st_size / 1e6
+            print(f"{name:24}{arrays:8.2f} as arrays{dataset:8.2f} as dataset{size:8.1f} MB")
 
 
 def bench_lanes() -> None:
@@ -196,6 +218,7 @@ def main() -> None:
     """Measure everything."""
     os.environ.setdefault("ROS_DOMAIN_ID", "99")
     bench_graph()
+    bench_bags()
     bench_lanes()
 
 

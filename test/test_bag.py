@@ -1,5 +1,7 @@
 """What is no bag, or a damaged one, is named in one sentence; others' messages are read."""
 
+import sys
+
 import numpy as np
 import pytest
 import yaml
@@ -116,6 +118,29 @@ def test_a_message_that_came_twice_counts_once(tmp_path):
 def test_a_bag_of_two_flights_is_named(tmp_path):
     with pytest.raises(BagError, match="more than one flight"):
         read_bag(two_states(tmp_path / "bag", 1e-15))
+
+
+@pytest.mark.parametrize("data", [b"", b"abc", bytes(200), b"\x00\x01\x00\x00" + bytes(range(90))])
+def test_a_message_that_is_none_is_named(tmp_path, data):
+    bag = BagWriter(tmp_path / "bag")
+    for topic in NOMINAL_TOPICS:
+        bag.write(topic.name, topic.layout.encode(0, [1.0] * len(topic.layout.fields)))
+    bag.write(STATE.name, data)
+    bag.close()
+    with pytest.raises(BagError, match="bag: /ahv/state: "):
+        read_bag(tmp_path / "bag")
+
+
+def test_without_ros_a_message_of_another_sender_is_named(tmp_path, monkeypatch):
+    path = two_states(tmp_path / "bag", 0.0)
+    monkeypatch.setattr("ahv_analysis.bag_reader.STATE.layout.decode_all", no_message_fits)
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    with pytest.raises(BagError, match="which only ROS can read"):
+        read_bag(path)
+
+
+def no_message_fits(messages):
+    return np.empty(0, np.int64), np.empty((0, 13)), np.empty(0, np.intp)
 
 
 def test_a_topic_of_another_type_is_named(tmp_path, whole):
