@@ -2,9 +2,9 @@
 
 Frames: `base_link_frd` are body axes forward-right-down, `map_ned` is the flat Earth
 north-east-down (REP-103 suffixes). Every answer carries the stamp of the state that it answers.
-Quality of service in lockstep: reliable, transient local, the last 200 s of flight kept, so that a
-node that joins late gets what it missed, and a recorder that is slow gets everything. In real time:
-reliable, volatile, short queues, for old messages would not be obeyed.
+Quality of service in lockstep: reliable, transient local, the last 200 s of flight kept, so that
+a node that joins late gets what it missed, and a recorder that is slow gets everything. In real
+time: reliable, volatile, short queues, for old messages would not be obeyed.
 """
 
 from sys import float_info
@@ -15,6 +15,7 @@ from ahv_msgs_py.layout import Layout, NamedVector, StampedAcceleration, Stamped
 NAMESPACE = "/ahv"
 BODY_FRAME = "base_link_frd"
 EARTH_FRAME = "map_ned"
+ROBOTICS_FRAMES = ("map", "base_link")  # east-north-up, forward-left-up, for tools that assume it
 QUEUE_DEPTH = 20_000  # messages kept per topic, sender and receiver: 200 s of flight
 
 STATE_NAMES = ("u", "v", "w", "P", "Q", "R", "phi", "theta", "psi", "x", "y", "h", "mass")
@@ -114,7 +115,24 @@ ODOMETRY = ViewerTopic(
     4,
     "pose and velocity at 10 Hz, map_ned, base_link_frd",
 )
-TRANSFORM = ViewerTopic("/tf", "tf2_msgs/msg/TFMessage", 8, "map_ned to base_link_frd at 10 Hz")
+ODOMETRY_ENU = ViewerTopic(
+    "/ahv/odometry_enu",
+    "nav_msgs/msg/Odometry",
+    4,
+    "the same in the frames of REP-103, map, base_link",
+)
+MARKER = ViewerTopic(
+    "/ahv/vehicle_marker",
+    "visualization_msgs/msg/Marker",
+    4,
+    "the winged cone as triangles in base_link_frd, once",
+)
+TRANSFORM = ViewerTopic(
+    "/tf",
+    "tf2_msgs/msg/TFMessage",
+    8,
+    "map to map_ned to base_link_frd to base_link, at 10 Hz",
+)
 DIAGNOSTICS = ViewerTopic(
     "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
@@ -125,4 +143,13 @@ LOG = ViewerTopic("/rosout", "rcl_interfaces/msg/Log", None, "log of all nodes")
 PARAMETER_EVENTS = ViewerTopic(
     "/parameter_events", "rcl_interfaces/msg/ParameterEvent", None, "changes of parameters", False
 )
-VIEWER_TOPICS = (CLOCK, ODOMETRY, TRANSFORM, DIAGNOSTICS, LOG, PARAMETER_EVENTS)
+VIEWER_TOPICS = (
+    CLOCK,
+    ODOMETRY,
+    ODOMETRY_ENU,
+    MARKER,
+    TRANSFORM,
+    DIAGNOSTICS,
+    LOG,
+    PARAMETER_EVENTS,
+)

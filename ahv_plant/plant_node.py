@@ -6,10 +6,10 @@ from functools import partial
 from typing import Any
 
 import rclpy
-from geometry_msgs.msg import Quaternion, TransformStamped
+from geometry_msgs.msg import Point, Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
-from scipy.spatial.transform import Rotation
+from visualization_msgs.msg import Marker
 
 from ahv_msgs_py.base_node import BaseNode, message_class, quality
 from ahv_msgs_py.faults import HOLD, Fault
@@ -22,7 +22,10 @@ from ahv_msgs_py.topics import (
     BODY_FRAME,
     CLOCK,
     EARTH_FRAME,
+    MARKER,
     ODOMETRY,
+    ODOMETRY_ENU,
+    ROBOTICS_FRAMES,
     STATE,
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
@@ -35,6 +38,15 @@ from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
 from ahv_plant.safe_command import SAFE_THROTTLE, safe_surfaces
 from ahv_plant.state import State, Surfaces
 from ahv_plant.vehicle import vehicle_step
+from ahv_plant.viewer_pose import (
+    FLU_IN_FRD,
+    NED_IN_ENU,
+    Pose,
+    Vector,
+    enu_pose,
+    ned_pose,
+    winged_cone,
+)
 
 LONGEST_WAIT = Duration(seconds=5.0)  # for a listener that has stopped, per topic
 VIEWER_PERIOD = 10  # steps between messages for viewers: 10 Hz
@@ -92,6 +104,8 @@ class PlantNode(BaseNode):
         viewers = quality(durable=True)
         self._send_clock = self.publisher(CLOCK.type_name, CLOCK.name, viewers)
         self._odometry = self.publisher(ODOMETRY.type_name, ODOMETRY.name, viewers)
+        self._odometry_enu = self.publisher(ODOMETRY_ENU.type_name, ODOMETRY_ENU.name, viewers)
+        self._marker = self.publisher(MARKER.type_name, MARKER.name, viewers)
         self._transform = self._transform_publisher()
         self._send_state = self.sender(STATE, self._listeners_changed)
 
@@ -230,34 +244,64 @@ class PlantNode(BaseNode):
         super().destroy_node()
 
     def _publish_for_viewers(self, stamp: int) -> None:
-        """Send pose and velocity as tools know them: a quaternion is good enough to look at."""
-        state = self.state
-        position = (state.x, state.y, -state.h)
-        rotation = Rotation.from_euler("ZYX", (state.psi, state.theta, state.phi)).as_quat()
-        x, y, z, w = (float(part) for part in rotation)
-        attitude = Quaternion(x=x, y=y, z=z, w=w)
-
-        odometry = Odometry(child_frame_id=BODY_FRAME)
-        pose, twist = odometry.pose.pose, odometry.twist.twist
-        pose.position.x, pose.position.y, pose.position.z = position
-        pose.orientation = attitude
-        twist.linear.x, twist.linear.y, twist.linear.z = state.u, state.v, state.w
-        twist.angular.x, twist.angular.y, twist.angular.z = state.P, state.Q, state.R
-        _head(odometry.header, stamp)
-        self._odometry.publish(odometry)
-
+        """Send pose and velocity in both conventions; the body once, it moves with its frame."""
+        ned, enu = ned_pose(self.state), enu_pose(self.state)
+        self._odometry.publish(_odometry(stamp, ned, EARTH_FRAME, BODY_FRAME))
+        self._odometry_enu.publish(_odometry(stamp, enu, *ROBOTICS_FRAMES))
+        if self.step == 0:
+            self._marker.publish(_marker(stamp))
         if self._transform is not None:
-            transform = TransformStamped(child_frame_id=BODY_FRAME)
-            shift = transform.transform.translation
-            shift.x, shift.y, shift.z = position
-            transform.transform.rotation = attitude
-            _head(transform.header, stamp)
-            self._transform.publish(message_class(TRANSFORM.type_name)(transforms=[transform]))
+            still = (0.0, 0.0, 0.0)
+            earth, body = ROBOTICS_FRAMES
+            transforms = [
+                _transform(stamp, earth, EARTH_FRAME, still, NED_IN_ENU),
+                _transform(stamp, EARTH_FRAME, BODY_FRAME, ned.position, ned.attitude),
+                _transform(stamp, BODY_FRAME, body, still, FLU_IN_FRD),
+            ]
+            self._transform.publish(message_class(TRANSFORM.type_name)(transforms=transforms))
 
 
-def _head(header: Any, stamp: int) -> None:
-    header.frame_id = EARTH_FRAME
+def _head(header: Any, stamp: int, frame: str) -> None:
+    header.frame_id = frame
     header.stamp.sec, header.stamp.nanosec = divmod(stamp, NANOSECONDS)
+
+
+def _odometry(stamp: int, pose: Pose, earth: str, body: str) -> Odometry:
+    message = Odometry(child_frame_id=body)
+    place, twist = message.pose.pose, message.twist.twist
+    place.position.x, place.position.y, place.position.z = pose.position
+    place.orientation = _attitude(pose.attitude)
+    twist.linear.x, twist.linear.y, twist.linear.z = pose.velocity
+    twist.angular.x, twist.angular.y, twist.angular.z = pose.rates
+    _head(message.header, stamp, earth)
+    return message
+
+
+def _attitude(parts: tuple[float, float, float, float]) -> Quaternion:
+    x, y, z, w = parts
+    return Quaternion(x=x, y=y, z=z, w=w)
+
+
+def _transform(
+    stamp: int, parent: str, child: str, shift: Vector, turn: tuple[float, float, float, float]
+) -> TransformStamped:
+    message = TransformStamped(child_frame_id=child)
+    to = message.transform.translation
+    to.x, to.y, to.z = shift
+    message.transform.rotation = _attitude(turn)
+    _head(message.header, stamp, parent)
+    return message
+
+
+def _marker(stamp: int) -> Marker:
+    """Return the winged cone as triangles that move with the body's frame."""
+    message = Marker(ns="ahv", type=Marker.TRIANGLE_LIST, frame_locked=True)
+    message.pose.orientation.w = 1.0
+    message.scale.x = message.scale.y = message.scale.z = 1.0
+    message.color.r, message.color.g, message.color.b, message.color.a = 0.45, 0.5, 0.6, 1.0
+    message.points = [Point(x=x, y=y, z=z) for x, y, z in winged_cone()]
+    _head(message.header, stamp, BODY_FRAME)
+    return message
 
 
 def main() -> None:

@@ -54,6 +54,7 @@ ROS = {
     "diagnostic_msgs": "ros-jazzy-common-interfaces",
     "geometry_msgs": "ros-jazzy-common-interfaces",
     "nav_msgs": "ros-jazzy-common-interfaces",
+    "visualization_msgs": "ros-jazzy-common-interfaces",
     "sensor_msgs": "ros-jazzy-common-interfaces",
     "std_msgs": "ros-jazzy-common-interfaces",
     "tf2_msgs": None,

@@ -24,6 +24,8 @@ SOURCES = {
 OWN = {f"ahv_plant.{name}" for name in ("compiled", "lanes", "elementary", "departure", "state")}
 OWN |= {
     "ahv_plant.safe_command",
+    "ahv_plant.viewer_pose",
+    "ahv_control.held_inputs",
     "ahv_plant.parameters",
     "ahv_control.parameters",
     "ahv_control.learner_message",

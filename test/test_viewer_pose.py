@@ -1,0 +1,50 @@
+"""What viewers see is the vehicle, in either convention."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scipy.spatial.transform import Rotation
+
+from ahv_control.flight_control import NEUTRAL
+from ahv_plant.dispersion import Truth
+from ahv_plant.state import State
+from ahv_plant.vehicle import state_rate
+from ahv_plant.viewer_pose import FLU_IN_FRD, NED_IN_ENU, enu_pose, ned_pose, winged_cone
+from test.flights import STATES
+
+pytestmark = pytest.mark.unit
+
+
+@given(STATES)
+def test_the_quaternion_turns_velocity_as_the_equations_of_motion_do(state):
+    pose = ned_pose(state)
+    north, east, down = Rotation.from_quat(pose.attitude).apply(pose.velocity)
+    moving = State(*state_rate(state, NEUTRAL, 0.2, 0.0, Truth(False)))
+    assert np.allclose((north, east, -down), (moving.x, moving.y, moving.h), rtol=0, atol=1e-8)
+
+
+@given(STATES)
+def test_both_conventions_show_one_motion(state):
+    ned, enu = ned_pose(state), enu_pose(state)
+    swap = Rotation.from_quat(NED_IN_ENU)
+    assert np.allclose(swap.apply(ned.position), enu.position, rtol=0, atol=1e-6)
+    for name in ("velocity", "rates"):
+        seen = Rotation.from_quat(ned.attitude).apply(getattr(ned, name))
+        other = Rotation.from_quat(enu.attitude).apply(getattr(enu, name))
+        assert np.allclose(swap.apply(seen), other, rtol=0, atol=1e-8)
+
+
+def test_the_robotics_frames_are_those_of_rep_103():
+    swap, turn = Rotation.from_quat(NED_IN_ENU), Rotation.from_quat(FLU_IN_FRD)
+    assert np.allclose(swap.apply((1, 0, 0)), (0, 1, 0))  # north is the second axis
+    assert np.allclose(swap.apply((0, 0, 1)), (0, 0, -1))
+    assert np.allclose(turn.apply((0, 1, 0)), (0, -1, 0))  # left is minus right
+
+
+def test_the_body_is_as_wide_as_its_span_and_points_forward():
+    corners = np.array(winged_cone())
+    assert len(corners) % 3 == 0
+    assert np.ptp(corners[:, 1]) == pytest.approx(18.288)
+    nose = corners[np.argmax(corners[:, 0])]
+    assert nose[0] > 0 and nose[1] == nose[2] == 0
+    assert corners[:, 2].min() < -5  # the fin is up
