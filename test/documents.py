@@ -18,7 +18,7 @@ PAGES = sorted(
 )
 SLOW = "<!-- slow -->"  # above a block that takes minutes
 SHELL = ("", "sh")  # a block that does not say its language is one of commands
-ELSEWHERE = ("colcon", "git", "plotjuggler", "ros2", "rosdep", "source", "sudo")  # ROS machines
+ELSEWHERE = ("colcon", "git", "plotjuggler", "ros2", "rosdep", "sudo")  # on another machine
 NODES = [path.name for path in (ROOT / "resource" / "nodes").iterdir()]
 SETTING = re.compile(r"[A-Z_]+=")  # of an environment variable, before a program
 LONGEST = 900  # [s]
@@ -97,27 +97,25 @@ def clone(folder: Path) -> Path:
 
 
 def run(block: Block, folder: Path, domain: int) -> None:
-    """Run the code of a block in a clone as it stands, without what is for another machine."""
+    """Run the code of a block in a clone as it stands, unless it is for another machine."""
     environment = os.environ | {
         "PATH": f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}",
         "ROS_DOMAIN_ID": str(domain),
     }
-    script = ["python", "-c", block.text]
-    commands = [line for line in block.commands if first_word(line) not in ELSEWHERE]
-    if block.language in SHELL:
-        script = ["bash", "-euo", "pipefail", "-c", "\n".join(commands)]
-    where = f"{block.page.name}:{block.line}"
-    if any(first_word(line) in NODES for line in commands):
-        run_in_terminals(commands, folder, environment)
-    else:
+    program = ["bash", "-euo", "pipefail"] if block.language in SHELL else ["python"]
+    first_words = set(map(first_word, block.commands))
+    if block.language in SHELL and first_words & set(NODES):
+        run_in_terminals(block.commands, folder, environment)
+    elif not (block.language in SHELL and first_words & set(ELSEWHERE)):
         done = subprocess.run(
-            script,
+            [*program, "-c", block.text],
             cwd=folder,
             env=environment,
             capture_output=True,
             text=True,
             timeout=LONGEST,
         )
+        where = f"{block.page.name}:{block.line}"
         assert done.returncode == 0, f"{where}: {done.stdout}{done.stderr}"
 
 

@@ -3,7 +3,7 @@
 The blocks of a page run in a clone of their own, in order and as they stand. A block without a
 language is one of commands; one that starts nodes runs in as many terminals as it has lines. Above
 a block, `<!-- slow -->` puts it off to `make test-slow`. Printed output is of language `text`.
-Commands for a machine with a ROS installation are checked by their names alone.
+Blocks for a machine with a ROS installation are checked by their names alone.
 """
 
 import re
@@ -15,6 +15,7 @@ import typer
 import yaml
 
 from ahv_analysis.command import app
+from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 from test.documents import (
     ELSEWHERE,
     NODES,
@@ -41,7 +42,7 @@ COMMANDS |= {
     for page in PAGES
 }
 TARGETS = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-PROGRAMS = (*ELSEWHERE, *NODES, ".", "ahv", "make", "pip", "python")
+PROGRAMS = (*ELSEWHERE, *NODES, ".", "ahv", "export", "make", "python", "timeout")
 by_name = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 
 
@@ -68,11 +69,13 @@ def check_python(words):
 def check_ros2(words):
     if words[:2] == ["launch", "ahv"]:
         file = (ROOT / "launch" / words[2]).read_text()
-        declared = re.findall(r'DeclareLaunchArgument\(\s*"(\w+)"', file)
-        given = [word.partition(":=")[0] for word in words[3:] if ":=" in word]
-        assert set(given) <= set(declared), (given, declared)
+        for name in (word.partition(":=")[0] for word in words[3:] if ":=" in word):
+            assert f'"{name}"' in file, name
     elif words[:2] == ["run", "ahv"]:
         assert words[2] in NODES or words[2].isupper(), words[2]
+    topics = [topic.name for topic in (*LOOP_TOPICS, *VIEWER_TOPICS)]
+    for name in (word for word in words if word.startswith("/ahv/")):
+        assert name in topics or name.removeprefix("/ahv/") in NODES, name
 
 
 CHECKS = {"ahv": check_ahv, "make": check_make, "python": check_python, "ros2": check_ros2}
@@ -96,6 +99,7 @@ def test_what_a_command_names_exists(place):
         "python -m ahv_analysis.stdy",
         "ros2 launch ahv flight.launch.py cas:=nominal_di",
         "ros2 run ahv plnt",
+        "ros2 topic echo /ahv/stat",
     ],
 )
 def test_a_misprint_is_noticed(command):

@@ -8,7 +8,7 @@ import rclpy
 from ahv_analysis.case import load_case
 from ahv_analysis.graph_flight import fly_graph
 from ahv_analysis.reference import MARKED, PARTS, ROUTES, filled
-from ahv_msgs_py.topics import LOOP_TOPICS
+from ahv_msgs_py.topics import LOOP_TOPICS, QUEUE_DEPTH
 
 ROOT = Path(__file__).parent.parent
 PAGES = [path for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))]
@@ -52,3 +52,8 @@ def test_the_graph_that_flies_is_the_one_that_is_drawn(domain):
     assert seen == {
         topic: ({sender}, set(listeners)) for topic, (sender, listeners) in ROUTES.items()
     }
+
+
+@pytest.mark.parametrize("name", ["messages.md", "your_own_controller.md"])
+def test_the_depth_of_queues_is_the_one_that_is_written(name):
+    assert f"{QUEUE_DEPTH:,}".replace(",", " ") in (ROOT / "docs" / name).read_text()

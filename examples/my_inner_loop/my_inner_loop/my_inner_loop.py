@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 
-QOS = QoSProfile(depth=400_000, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # as docs/messages.md
+QOS = QoSProfile(depth=20_000, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # as docs/messages.md
 NAMES = ["right_elevon", "left_elevon", "rudder"]
 ROLL, PITCH, YAW = 5.11, 1.146, -0.668  # [1/s^2] by elevons opposed, elevons together, rudder
 TRIM = -0.126  # [rad] both elevons in cruise

@@ -28,7 +28,7 @@ public:
   MyInnerLoop()
   : Node("inner_loop", "/ahv")
   {
-    const auto qos = rclcpp::QoS(rclcpp::KeepLast(400000)).reliable().transient_local();
+    const auto qos = rclcpp::QoS(rclcpp::KeepLast(20000)).reliable().transient_local();
     publisher_ = create_publisher<JointState>("surface_command", qos);
     states_ = create_subscription<JointState>(
       "state", qos, [this](JointState::ConstSharedPtr message) {
