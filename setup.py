@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Package `ahv`: built by colcon as ament_python, and by pip into a virtual environment."""
 
 import sys

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The commands `ahv bag`: what a bag holds, recovering a damaged one, exporting it."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What rosbag2 wants to know of a bag: metadata.yaml, and the same text in its MCAP file."""
 
 from collections.abc import Mapping, Sequence

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Reading a bag back as arrays: ours, or any that rosbag2 recorded as MCAP."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Recovering a bag: what is readable of it goes into a new, complete one beside it."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Writing a bag: message bytes as they come, on disk a tenth of a second later at the latest."""
 
 import shutil

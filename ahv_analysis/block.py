@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A block of runs advanced together in lanes, and one run alone: the engine of the campaigns."""
 
 import numpy as np

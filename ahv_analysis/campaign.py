@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Monte-Carlo campaigns: drawn flights on any executor, one row a run, resumed if stopped."""
 
 from collections.abc import Callable, Iterator

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The commands of campaigns: `ahv monte-carlo`, its `rerun`, and `ahv table`."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What a campaign keeps: a folder a level, of Parquet files with one row a run.
 
 A file holds the runs of one part of the campaign, so that nothing ever needs more memory than a

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The studies behind docs/results.md: `python -m ahv_analysis.campaign_study`.
 
 What the cautious start of a protected flight is worth, which vehicles no elevon can save, and what

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What a campaign came to, counted part by part."""
 
 from collections import Counter

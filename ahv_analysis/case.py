@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Case files: a flight's settings as a ROS parameter file, read and checked without ROS.
 
 The same file sets up a flight here and a node by `--ros-args --params-file`.

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What the commands share: tables, progress, numbers, and errors in one sentence."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A flight as an xarray Dataset, time x signal, and as the files that other tools read."""
 
 import io

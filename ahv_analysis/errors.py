@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What can be wrong around a flight; the message of each is one sentence."""
 
 

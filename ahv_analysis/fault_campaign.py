@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Faults injected into flights in real time, one process per node, and what became of them."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The commands `ahv faults` and `ahv faults run`."""
 
 import time

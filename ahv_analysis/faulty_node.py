@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Nodes that can be told to fail: the same nodes, with publishers that send wrong messages."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The report's figures, drawn from recorded flights."""
 
 from collections.abc import Callable, Mapping, Sequence

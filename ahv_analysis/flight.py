@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A flight in this process, without ROS: the same laws and vehicle, composed the same way."""
 
 import time

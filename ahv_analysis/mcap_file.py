@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A growing MCAP file whose chunks are whole, checksummed and in the system's hands once added.
 
 The records are those of the `mcap` package. Its writer gathers a chunk message by message in

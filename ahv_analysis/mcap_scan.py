@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What an MCAP file holds and where it is damaged: one walk, for reading and for recovery.
 
 The readers of the `mcap` package, whose records these are, stop at the first damage. Everything

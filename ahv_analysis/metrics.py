@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """How well a vehicle was flown, in numbers with exact definitions; docs/reports.md lists them.
 
 States are samples. A command holds from its step to the next one, as the plant flies it; that of

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What the server that node processes are forked off loads once: the nodes and their laws."""
 
 from ahv_analysis.case import load_case

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A flight on the ROS graph, one process per node."""
 
 import multiprocessing

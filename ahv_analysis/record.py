@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A flight as arrays, whether it comes from a bag or from memory, and what is derived from it."""
 
 from collections.abc import Iterable

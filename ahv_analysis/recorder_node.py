@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Node `recorder`: every topic of the graph into an MCAP bag, the bytes as they came."""
 
 import time

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What the documents say of topics, parameters and the graph, written from the code.
 
 A page asks for a part between the marks `<!-- reference NAME -->` and `<!-- end -->`, and

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A recorded flight fed to the controller nodes again, on a live graph.
 
 A feeder publishes the messages of the bag on their own topics, as the bytes they were recorded as,

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Figures of a replay: commands as recorded and as replayed, and the difference between them."""
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What a replay takes from a bag: the messages of the loop by their stamps, changes in flight."""
 
 from ast import literal_eval

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Recorded and replayed commands side by side."""
 
 from collections.abc import Iterable, Mapping, Sequence

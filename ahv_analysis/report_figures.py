@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Which figures of the report a bag or a campaign is for, and the flights that they show."""
 
 from collections.abc import Callable, Mapping, Sequence

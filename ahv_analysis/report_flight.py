@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The flights of a report: what a bag tells of one, and the verdict on it."""
 
 from collections import Counter

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A page of one flight, or of several overlaid, as one HTML file that needs nothing else."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The quantities that a flight is read by: names, units, commands, bounds. Angles in degrees."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The studies behind the defaults of the adaptive law: `python -m ahv_analysis.study`.
 
 Flights of the section 4.3 start, and of one disturbed in all axes, on drawn vehicles; what is

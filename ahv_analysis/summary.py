@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What a flight came to, in a few numbers."""
 
 from typing import Any

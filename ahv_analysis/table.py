@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Table 5.1 of the report, beside the same campaign flown here."""
 
 from collections.abc import Callable, Sequence

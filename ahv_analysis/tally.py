@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What a flight of a campaign comes to, kept up step by step: verdict, cause, extremes.
 
 Element-wise, so that a run counts the same alone and in a lane.

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What software flies: filed with every bag, so that a flight can be told from another's."""
 
 import platform

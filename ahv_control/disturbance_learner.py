@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Disturbance learner: observer, basis and constrained weight update (section 4.2, eqs 4.3-4.14).
 
 Learned in degrees: the report's gamma and k_b mean what they should only with rates in deg/s.

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Node `disturbance_learner`: learns what the nominal model lacks."""
 
 import rclpy

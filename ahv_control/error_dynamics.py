@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """How a rate error should decay: linear, or state-constrained (eqs 5.4-5.12). One law for both.
 
 With the barrier Lyapunov function of eq 5.4, e_dot = -k / (k_s^2 - e^2)^(lambda - 1) e, eq 5.11.

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The loops composed, as the graph composes its nodes (Fig. 3.1)."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What the control nodes go on with while an input stays away, in real time.
 
 Each takes the last values, None if there were none, and their age in steps.

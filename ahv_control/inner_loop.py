@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Inner loop: from body-rate command to the control surfaces (section 3.3, chapters 4 and 5)."""
 
 from typing import NamedTuple

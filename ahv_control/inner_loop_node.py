@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Node `inner_loop`: body-rate command to control surfaces, nominal or adaptive."""
 
 import rclpy

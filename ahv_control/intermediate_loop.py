@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Intermediate loop: from attitude error to the body-rate command (section 3.2)."""
 
 from typing import NamedTuple

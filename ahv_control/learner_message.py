@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The learner's state and estimate as the values of their messages, and back."""
 
 from collections.abc import Sequence

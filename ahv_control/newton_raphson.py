@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Surfaces that give the body rates a demanded acceleration (section 3.3).
 
 Newton-Raphson with an analytic Jacobian on f(X, U) of eq 2.3.

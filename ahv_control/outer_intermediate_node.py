@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Node `outer_intermediate`: altitude to attitude command to body-rate command."""
 
 import rclpy

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Outer loop: from altitude error to the attitude command (section 3.1)."""
 
 from math import sqrt

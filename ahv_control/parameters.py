@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Parameters of the controller nodes, by default those of section 3.5.2, and their settings."""
 
 from collections.abc import Mapping

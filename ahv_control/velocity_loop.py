@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Velocity loop: from speed error to the throttle (section 3.4)."""
 
 from typing import NamedTuple

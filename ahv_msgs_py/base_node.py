@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The shell that all nodes share: lifecycle, parameters, guarded topics as exact bytes, health."""
 
 import gc

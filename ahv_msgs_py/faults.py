@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What can go wrong in flight, how it is noticed, and what happens then: the one list of it.
 
 `ahv faults` prints this table. Every entry is counted by the node that notices it, named in its

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The guard of one input: every message is judged before anything is done with it."""
 
 from collections.abc import Callable

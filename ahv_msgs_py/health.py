@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The health of a node: what it counts and times between two reports."""
 
 from array import array

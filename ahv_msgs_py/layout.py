@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Messages of fixed layout as bytes: what crosses a topic, exactly, at a fifth of the usual cost.
 
 A message whose frame and names are constant has a constant layout in CDR (little-endian, OMG

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A node as a process: start, spin, end."""
 
 import os

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Parameters of the nodes: name, unit, range and meaning, checked alike with and without ROS."""
 
 from collections.abc import Iterable, Mapping

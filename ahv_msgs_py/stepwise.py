@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Inputs of one step, collected by their stamp: the messages of a step may come in any order."""
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The topics of the graph: names, message types, layouts, units and frames.
 
 Frames: `base_link_frd` are body axes forward-right-down, `map_ned` is the flat Earth

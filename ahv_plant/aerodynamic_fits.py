@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The 22 aerodynamic polynomials of the winged-cone vehicle, in Horner form.
 
 Fits by Keshmiri, Colgren and Mirmirani (2005), which the report cites in section 2.2 and does not

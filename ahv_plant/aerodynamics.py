@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Aerodynamic coefficients, forces and moments (section 2.2, eqs 2.7-2.13)."""
 
 from math import sqrt

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """International Standard Atmosphere, 0 to 47 km geopotential altitude (ISO 2533:1975).
 
 The report's trim fits the table entered with h as geopotential altitude, so that is the default;

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """One source, three ways to run it: plain floats, compiled scalars, and lanes of a vector loop.
 
 A function marked `elementwise` takes and returns floats or named tuples of floats. It uses only

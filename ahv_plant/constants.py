@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Table 2.1 of the report, actuator limits of section 3.5.2, and what the simulation fixes."""
 
 from math import pi

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """When a flight is over because the model no longer describes the vehicle."""
 
 from enum import IntEnum

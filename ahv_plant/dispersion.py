@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What the real vehicle has and its flight control does not know (sections 4.1 and 4.3).
 
 Only the plant may import this module; a test sees to it.

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Sine, cosine, arctangent, arcsine, exponential and logarithm from + - * / and sqrt alone.
 
 The C library's own differ from machine to machine, cannot run in vector lanes, and would make the

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Lanes: a number type of compiled code that holds the same quantity of several runs.
 
 `elementwise` functions accept lanes wherever they accept numbers, alone and within named tuples,

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Does a vehicle have a trim at all? Section 3.5.1 by two equations, in lanes too."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Inertia and centre of gravity as functions of the mass (section 2.1 and eq 2.14)."""
 
 from typing import NamedTuple

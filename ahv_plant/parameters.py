@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Parameters of the plant node: start, duration, and what the air and the graph are like."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Node `plant`: the vehicle, in lockstep with its flight control or by the wall clock."""
 
 import time

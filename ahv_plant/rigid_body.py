@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Rigid-body equations over a flat Earth (eqs 2.1, 2.3-2.5, corrected in docs/errata.md)."""
 
 from ahv_plant.aerodynamics import Loads

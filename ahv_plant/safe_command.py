@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What the vehicle does when commands stay away: the stated safe command."""
 
 from ahv_plant.state import Surfaces

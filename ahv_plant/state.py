@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The vectors of the vehicle, by name: state, control surfaces."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Trimmed cruise flight: the seven equations of section 3.5.1."""
 
 from math import atan2

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The vehicle: eqs 2.1-2.14 under held controls, and one Runge-Kutta step of them."""
 
 from ahv_plant.aerodynamics import Loads, aerodynamic_coefficients, air_data, loads

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The vehicle as viewers know it: poses by quaternion in both conventions, and a body to look at.
 
 Aerospace: `map_ned` (north, east, down) and `base_link_frd` (forward, right, down). Robotics,

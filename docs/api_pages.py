@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """API pages from the docstrings, in build/docs, with the units that stand behind the fields.
 
 `make docs` calls this with NUMBA_DISABLE_JIT=1, so that compiled functions are documented as the

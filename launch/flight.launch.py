@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Fly one case on the graph, a process per node, until the plant ends the flight.
 
     ros2 launch ahv flight.launch.py case:=nominal_di out:=flights/first

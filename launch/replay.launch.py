@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Replay a recorded flight where tools can watch it, and compare every command.
 
     ros2 launch ahv replay.launch.py bag:=flights/first/bag rate:=2.0

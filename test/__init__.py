@@ -1,0 +1,1 @@
+# Copyright 2026 ahv developers, Apache-2.0

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Bags that tests damage, and such as stock rosbag2 records them."""
 
 import shutil

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Rates of the engines, each beside a reference measured in the same run: `make bench`."""
 
 import json

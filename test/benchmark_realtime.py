@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Real time for minutes and lockstep for an hour of flight: `make bench`."""
 
 import argparse

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What all tests share: a private ROS domain, repeatable random examples."""
 
 import itertools

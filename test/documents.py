@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The code of the documents: which there is, and how to run it."""
 
 import os

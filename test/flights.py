@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """States that tests start from."""
 
 from hypothesis import strategies as st

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Kill recorders with kill -9 in mid-flight, see what is left: `python -m test.kill_recorder`.
 
 The flight is on the graph of this process in lockstep, every recorder in a process of its own. A

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Neuro-adaptive DI and SC-GDI are one law, which keeps the vehicle that the nominal law loses."""
 
 import math

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The aerodynamic polynomials are the published ones, and add up to the six coefficients."""
 
 import csv

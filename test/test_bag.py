@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What is no bag, or a damaged one, is named in one sentence; others' messages are read."""
 
 import sys

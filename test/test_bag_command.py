@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """`ahv bag`: facts, recovery, tables; damage is one sentence, exit code 2, and left as it is."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A flight as a Dataset has every signal with its unit and frame, and leaves it without a loss."""
 
 import io

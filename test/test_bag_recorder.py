@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The recorder loses next to nothing to kill -9, and says in one sentence if the disk fails."""
 
 import os

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What is readable of a damaged bag becomes a whole one; what is lost is said, nothing changes."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A campaign is its runs: whatever flies them, wherever it stopped, each can be flown again."""
 
 import json

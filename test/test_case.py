@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A case file is a ROS parameter file; what is wrong with it is said in one sentence."""
 
 import math

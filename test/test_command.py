@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The `ahv` command: numbers as JSON, one sentence and exit code 2 for what cannot be."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Every loop inverts what it says it inverts."""
 
 import math

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A flight ends when the model no longer describes the vehicle, and says why."""
 
 import math

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Whatever is imported is declared: to pip in setup.py, to rosdep in package.xml."""
 
 import ast

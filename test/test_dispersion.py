@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The true vehicle may differ from the nominal one; the flight control never hears of it."""
 
 import ast

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Docstrings of the pure packages say what a number is measured in, and where a law comes from.
 
 Read from the source, so that compiled functions count like any other. That there is a docstring at

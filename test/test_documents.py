@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Every command and every block of code of the documents works, every name in them exists.
 
 The blocks of a page run in a clone of their own, in order and as they stand. A block without a

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The elementary functions are those of mathematics, to a few units in the last place."""
 
 import math

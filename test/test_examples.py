@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The examples: a controller of one's own flies the same plant; their packages can be built."""
 
 import os

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Bad messages, ten thousand to every subscription of every node: none obeyed, all counted."""
 
 import math

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The graph flies what the library flies, to the last bit, and leaves nothing behind."""
 
 import threading

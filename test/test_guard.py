@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A guard lets one voice through, in order, with values that can be; all else it names."""
 
 import math

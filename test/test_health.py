@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A node's report counts its faults, times its answers and names the gravest level."""
 
 import pytest

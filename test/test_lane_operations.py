@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Every operation on lanes gives each lane the bits that the same operation gives its number."""
 
 import math

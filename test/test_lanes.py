@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A lane is a run: the same bits as alone, by machine instructions that advance all at once."""
 
 import math

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The disturbance learner is chapter 4's, its barrier holds in discrete time, and it learns."""
 
 import math

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The walk through an MCAP file reads what is whole, sees what is not, and never stumbles."""
 
 import io

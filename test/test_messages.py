@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Bytes of fixed layout are those of ROS and rosbags for the same message, to every bit."""
 
 import struct

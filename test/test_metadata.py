@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What release tools read: change log and citation."""
 
 from pathlib import Path
@@ -24,3 +25,12 @@ def test_the_citation_is_of_this_version(setup):  # noqa: F811
     required = {"cff-version", "message", "title", "authors"}
     assert required <= set(citation)
     assert (citation["version"], citation["license"]) == (setup["version"], setup["license"])
+
+
+def test_every_source_file_says_whose_it_is():
+    """REP-2004 asks for a statement in each, even of a package that is an experiment."""
+    folders = ("ahv_*", "docs", "examples", "launch", "resource", "test")
+    kinds = ("*.py", "*.cpp", "CMakeLists.txt", "nodes/*")
+    for path in (path for f in folders for kind in kinds for path in ROOT.glob(f"{f}/**/{kind}")):
+        beginning = path.read_text().splitlines()[:2]
+        assert any("Copyright 2026 ahv developers, Apache-2.0" in line for line in beginning), path

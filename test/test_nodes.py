@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Nodes are managed by the standard lifecycle, and changed in flight at the border of a step."""
 
 import math

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The package installs by pip and by colcon alike: executables, index, cases, launch file."""
 
 import os

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """One process per node: the same bits in lockstep, and flight through faults in real time."""
 
 import os

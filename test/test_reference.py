@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The documents say what the code says: parts written from it are up to date, and true."""
 
 from pathlib import Path

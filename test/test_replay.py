@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A bag replays to the same bits; what differs is named; nobody else hears a replay."""
 
 import json

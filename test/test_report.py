@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """`ahv report`: metrics against closed forms, and pages as a browser sees them."""
 
 import json

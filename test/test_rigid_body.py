@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The equations of motion against NASA's check case, conservation laws and their general form."""
 
 import csv

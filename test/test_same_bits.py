@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Plain Python floats and compiled code give the same bits, by function and over a flight."""
 
 import os

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """A step is answered once, when all its inputs are there, in whatever order they come."""
 
 import pytest

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What a ROS workspace's own linters say of the package; ruff has said the same before them."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Trim is section 3.5.1's, to the digits that an independent solution gave."""
 
 import pytest

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """One rule decides what is a success: alone, recorded, or as a run of a campaign."""
 
 import pytest

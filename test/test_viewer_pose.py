@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """What viewers see is the vehicle, in either convention."""
 
 import numpy as np

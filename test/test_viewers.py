@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """The layouts of PlotJuggler and Foxglove show what a real bag holds, by the names that it has."""
 
 import json

@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """Package `my_inner_loop`, built by colcon."""
 
 from setuptools import setup

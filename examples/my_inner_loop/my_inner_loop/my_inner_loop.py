@@ -1,3 +1,4 @@
+# Copyright 2026 ahv developers, Apache-2.0
 """An inner loop of one's own: body rates to surfaces by proportional and integral feedback.
 
 All it knows of the vehicle is how much angular acceleration a surface gives in cruise.
