@@ -25,7 +25,7 @@ def bag_info(path: Path) -> dict[str, Any]:
     text = (bag.metadata.get("custom_data") or {}).get(RECOVERED)
     recovered = None if text is None else json.loads(text)
     whole = recovered is None or recovered["lost_messages"] == 0
-    files = [path / Path(name).name for name in bag.metadata["relative_file_paths"]]
+    files = [path / name for name in bag.metadata["relative_file_paths"]]
     return {
         "bag": str(path),
         "complete": missing == 0 and whole,

@@ -123,7 +123,10 @@ def custom_of_record(record: Metadata) -> dict[str, str]:
 
 
 def read_metadata(path: Path) -> dict[str, Any]:
-    """Contents of metadata.yaml of the bag folder `path`; BagError if they do not fit."""
+    """Contents of metadata.yaml of the bag folder `path`; BagError if they do not fit.
+
+    The files of the bag are named as they lie in the folder.
+    """
     file = path / METADATA_FILE
     if not file.is_file():
         if any(path.glob("*.mcap")):
@@ -135,17 +138,21 @@ def read_metadata(path: Path) -> dict[str, Any]:
     try:
         content = yaml.load(file.read_text(encoding="utf-8"), _YamlLoader)
         metadata: dict[str, Any] = content["rosbag2_bagfile_information"]
-        storage, files = metadata["storage_identifier"], metadata["relative_file_paths"]
-        names = [Path(name).name for name in files]
+        storage = metadata["storage_identifier"]
+        metadata["relative_file_paths"] = [
+            Path(name).name for name in metadata["relative_file_paths"]
+        ]
     except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise BagError(f"{file} is not the metadata of a bag: {reason}") from error
     if storage != "mcap":
         raise BagError(f"{path} is stored as {storage!r}, but must be 'mcap'")
-    missing = [name for name in names if not (path / name).is_file()]
-    if missing:
-        raise BagError(f"{path} lacks its {', '.join(missing)}")
     return metadata
+
+
+def missing_files(path: Path, metadata: Mapping[str, Any]) -> list[str]:
+    """Files of the bag folder `path` that its metadata names and that are not there."""
+    return [name for name in metadata["relative_file_paths"] if not (path / name).is_file()]
 
 
 def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:

@@ -12,7 +12,7 @@ import zstandard
 from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
-from ahv_analysis.bag_metadata import NOTES, read_metadata
+from ahv_analysis.bag_metadata import NOTES, missing_files, read_metadata
 from ahv_analysis.errors import BagError
 from ahv_analysis.mcap_scan import HEAD, Block, Damage, Piece, scan
 from ahv_analysis.record import Array, FlightRecord
@@ -59,11 +59,14 @@ def read_bag(path: Path) -> FlightRecord:
 def load_bag(path: Path) -> Bag:
     """All messages of the bag folder `path`; BagError says in one sentence what is wrong."""
     metadata = read_metadata(path)
+    missing = missing_files(path, metadata)
+    if missing:
+        raise BagError(f"{path} lacks its {', '.join(missing)}")
     mode = str(metadata.get("compression_mode") or "").lower()
     topics: dict[str, Recorded] = {}
     for name in metadata["relative_file_paths"]:
         try:
-            data = (path / Path(name).name).read_bytes()
+            data = (path / name).read_bytes()
             if mode == "file":
                 data = _decompressed(data)
         except (OSError, zstandard.ZstdError) as error:

@@ -20,6 +20,7 @@ from ahv_analysis.bag_metadata import (
     bag_metadata,
     custom_of_record,
     metadata_record,
+    missing_files,
     read_metadata,
     write_metadata,
 )
@@ -77,6 +78,8 @@ def recover(path: Path, out: Path) -> Recovery | None:
     metadata, losses = {}, []
     try:
         metadata = read_metadata(path)
+        absent = missing_files(path, metadata)
+        losses += [Loss(name, 0, 0, "it is missing") for name in absent]
     except BagError as error:
         there = (path / METADATA_FILE).exists()
         losses.append(Loss(METADATA_FILE, 0, 0, str(error) if there else "it is missing"))

@@ -120,6 +120,17 @@ def test_a_stock_bag_of_several_files_is_recovered(tmp_path, whole, compression,
     assert sum(map(len, new.values())) > sum(map(len, old.values())) / 2
 
 
+def test_a_file_that_is_missing_counts_as_lost(tmp_path, whole):
+    stock(tmp_path / "bag", whole)
+    (tmp_path / "bag" / "bag_1.mcap").unlink()
+    recovery = recover(tmp_path / "bag", tmp_path / "new")
+    assert [(loss.file, loss.what) for loss in recovery.losses] == [
+        ("bag_1.mcap", "it is missing")
+    ]
+    assert recovery.lost_messages == sum(map(len, messages(whole).values())) - recovery.messages
+    assert not bag_info(tmp_path / "new")["complete"]
+
+
 def test_a_topic_whose_name_is_lost_is_said_to_be(tmp_path, whole):
     stock(tmp_path / "bag", whole, use_chunking=False, files=1)
     file = tmp_path / "bag" / "bag_0.mcap"
