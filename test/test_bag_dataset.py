@@ -3,6 +3,7 @@
 
 import io
 import json
+import re
 
 import numpy as np
 import pyarrow.csv
@@ -25,7 +26,7 @@ from ahv_analysis.dataset import (
     bag_dataset,
 )
 from ahv_analysis.flight import fly_library
-from ahv_msgs_py.topics import LEARNER_NAMES, LOOP_TOPICS
+from ahv_msgs_py.topics import BASIS_NAMES, LEARNER_NAMES, LOOP_TOPICS
 from ahv_plant.aerodynamics import air_data
 from ahv_plant.state import State
 
@@ -88,6 +89,16 @@ def test_units_and_frames_are_those_of_the_topics():
         assert [signal.units for signal in signals] == units * (len(signals) // len(units))
     names = [signal.name for signal in LEARNER_SIGNALS]
     assert names == [name.replace(".", "_") for name in LEARNER_NAMES]
+
+
+def test_units_of_the_learner_follow_from_those_of_its_basis():
+    units = {signal.name: signal.units for signal in (*LEARNER_SIGNALS, *ESTIMATE_SIGNALS)}
+    assert {units[f"{plant}_{rate}"] for plant in ("X_a", "X_d") for rate in "PQR"} == {"rad/s"}
+    assert {units[f"d_{rate}"] for rate in "PQR"} == {"rad/s^2"}
+    for term in BASIS_NAMES:
+        power = sum(int(part or 1) for part in re.findall(r"[PQR](\d?)", term))
+        expected = f"deg/s^2/(deg/s)^{power}" if power else "deg/s^2"
+        assert {units[f"W_{rate}_{term}"] for rate in "PQR"} == {expected}, term
 
 
 def test_attributes_say_what_flew(bag):
