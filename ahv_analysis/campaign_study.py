@@ -17,6 +17,7 @@ from ahv_analysis.flight import fly
 from ahv_analysis.record import record
 from ahv_analysis.study import row
 from ahv_analysis.table import REPORT
+from ahv_control.flight_control import NEUTRAL, nominal_control
 from ahv_plant.compiled import kernel
 from ahv_plant.constants import (
     DEGREES,
@@ -36,6 +37,18 @@ FULL_NOSE_DOWN = Surfaces(SURFACE_MINIMUM, SURFACE_MINIMUM, 0.0)
 LONGEST = 3000  # steps in which a nose comes down, if it does
 
 
+FASTER = dict.fromkeys(("k_ap_P", "k_ap_Q", "k_ap_R"), 50.0)  # [1/s]
+STARTS: dict[str, Mapping[str, Mapping[str, object]]] = {
+    f"d_0 = {first:g} deg/s^2": {"disturbance_learner": {"first_estimate": first}}
+    for first in (0.0, 10.0, 20.0, 30.0, 40.0, 60.0)
+} | {
+    "d_0 = 0, gamma = 2000, k_ap = 50": {
+        "disturbance_learner": {"first_estimate": 0.0, "gamma": 2000.0} | FASTER,
+        "inner_loop": FASTER,
+    }
+}
+
+
 def fly_parts(campaign: Campaign) -> Iterator[Columns]:
     """Fly a campaign on all cores, keeping nothing: its columns job by job."""
 
@@ -53,14 +66,16 @@ def failed_runs(campaign: Campaign) -> set[int]:
 
 
 @kernel
-def nose_comes_down(state: State, truth: Truth) -> bool:
+def nose_comes_down(state: State, truth: Truth, before: Surfaces, delay: int) -> bool:
     """Whether alpha falls below zero before it passes 5 deg, with all that there is against it.
 
-    That is elevons at their stop and full thrust from the first instant on. If it is not true,
-    the elevons cannot save the vehicle, whatever law moves them.
+    That is full thrust, and elevons at their stop from the step `delay` on; until then surfaces
+    stay as `before`. If it is not true without delay, the elevons cannot save the vehicle,
+    whatever law moves them.
     """
     for step in range(LONGEST):
-        state = vehicle_step(state, FULL_NOSE_DOWN, THROTTLE_MAXIMUM, step * STEP, truth)
+        surfaces = before if step < delay else FULL_NOSE_DOWN
+        state = vehicle_step(state, surfaces, THROTTLE_MAXIMUM, step * STEP, truth)
         alpha = atan(state.w / state.u)
         if alpha > UNSTART_ALPHA:
             return False
@@ -69,27 +84,39 @@ def nose_comes_down(state: State, truth: Truth) -> bool:
     return False
 
 
+def beyond_elevons(campaign: Campaign, delay: int) -> set[int]:
+    """Runs on vehicles that their elevons cannot save after a delay [steps] in level trim."""
+    start, control = campaign.case.plant.initial, campaign.case.control
+    trimmed = nominal_control(start, NEUTRAL, control).surfaces
+    truths = [Truth(dispersion=campaign.dispersion(run)) for run in range(campaign.runs)]
+    return {
+        run
+        for run, truth in enumerate(truths)
+        if not nose_comes_down(start, truth, trimmed, delay)
+    }
+
+
 def study_protection() -> None:
     """First estimates of the cautious start, and the vehicles beyond their elevons."""
     case = load_case("neuro_adaptive_sc_gdi_protected")
     campaign = Campaign(case, LEVEL, RUNS, SEED)
-    start = case.plant.initial
-    beyond = {
-        run
-        for run in range(RUNS)
-        if not nose_comes_down(start, Truth(dispersion=campaign.dispersion(run)))
-    }
-    print(f"\n{RUNS} vehicles at {LEVEL:.0%}, seed {SEED}; {len(beyond)} beyond their elevons\n")
-    row("first estimate deg/s^2", "lost", "beyond their elevons", "nominal: alpha deg", "h m")
+    print(f"\n{RUNS} vehicles at {LEVEL:.0%}, seed {SEED}: how long elevons may wait\n")
+    row("elevons full nose down from s", "vehicles that pass 5 deg")
+    row(*["---"] * 2)
+    for delay in (0, 1, 2, 5, 10, 20, 50):
+        row(delay * STEP, len(beyond_elevons(campaign, delay)))
+    beyond = beyond_elevons(campaign, 0)
+    print("\nThe cautious start:\n")
+    row("start", "lost", "of these beyond their elevons", "nominal: alpha deg", "h m")
     row(*["---"] * 5)
-    for first_estimate in (0.0, 10.0, 20.0, 30.0, 40.0, 60.0):
-        cautious = changed(case, {"disturbance_learner": {"first_estimate": first_estimate}})
-        lost = failed_runs(Campaign(cautious, LEVEL, RUNS, SEED))
+    for name, changes in STARTS.items():
+        chosen = changed(case, changes)
+        lost = failed_runs(Campaign(chosen, LEVEL, RUNS, SEED))
         undispersed = {f"dispersion.{name}": 1.0 for name in Dispersion._fields}
-        nominal = record(fly(changed(cautious, {"plant": undispersed})), False)
+        nominal = record(fly(changed(chosen, {"plant": undispersed})), False)
         alpha, h = nominal.air.alpha * DEGREES, nominal.column("h")
         row(
-            first_estimate,
+            name,
             len(lost),
             len(lost & beyond),
             f"{alpha.min():.2f} to {alpha.max():.2f}",
