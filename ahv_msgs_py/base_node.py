@@ -43,7 +43,8 @@ from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE, QUEUE_DEPTH, STATE, LoopT
 REALTIME = Parameter("realtime", False, "100 Hz by the wall clock; if false, lockstep")
 AUTOSTART = Parameter("autostart", True, "configure and activate when started as a process")
 SHELL_PARAMETERS = (REALTIME, AUTOSTART)
-REALTIME_DEPTH = 10  # messages kept in real time: older ones would not be obeyed
+REALTIME_DEPTH = 10  # messages kept by a receiver in real time: older ones would not be obeyed
+SENDER_DEPTH = 1000  # messages that a sender keeps for a receiver that is slow, as a recorder
 STATE_LOST_AFTER = 500_000_000  # [ns]
 
 
@@ -244,7 +245,7 @@ class BaseNode(LifecycleNode):
     # Topics
 
     def loop_quality(self) -> QoSProfile:
-        """Quality of service of the loop: lockstep keeps a whole flight, real time little."""
+        """Quality of service of a receiver: lockstep keeps a whole flight, real time little."""
         return quality(durable=False, depth=REALTIME_DEPTH) if self.realtime else quality(True)
 
     def publisher(
@@ -272,9 +273,8 @@ class BaseNode(LifecycleNode):
         Values that no receiver would take are not sent, and counted.
         """
         encode = topic.layout.encode
-        publish = self.publisher(
-            topic.layout.type_name, topic.name, self.loop_quality(), matched
-        ).publish
+        qos = quality(durable=False, depth=SENDER_DEPTH) if self.realtime else quality(True)
+        publish = self.publisher(topic.layout.type_name, topic.name, qos, matched).publish
         low = min(low for low, _ in topic.bounds)
         high = max(high for _, high in topic.bounds)
 
