@@ -1,8 +1,8 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The studies behind docs/results.md: `python -m ahv_analysis.campaign_study`.
 
-What the cautious start of a protected flight is worth, which vehicles no elevon can save, and what
-other readings of the report's section 5.2 give.
+What the cautious start of a protected flight is worth, which vehicles full elevons do not save,
+and what other readings of the report's chapter 5 give.
 """
 
 from collections.abc import Iterator, Mapping
@@ -70,8 +70,7 @@ def nose_comes_down(state: State, truth: Truth, before: Surfaces, delay: int) ->
     """Whether alpha falls below zero before it passes 5 deg, with all that there is against it.
 
     That is full thrust, and elevons at their stop from the step `delay` on; until then surfaces
-    stay as `before`. If it is not true without delay, the elevons cannot save the vehicle,
-    whatever law moves them.
+    stay as `before`. A vehicle of which it is not true without delay is beyond its elevons.
     """
     for step in range(LONGEST):
         surfaces = before if step < delay else FULL_NOSE_DOWN

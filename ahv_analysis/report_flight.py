@@ -14,6 +14,8 @@ from ahv_analysis.errors import BagError
 from ahv_analysis.metrics import measure, why_ended_early
 from ahv_analysis.record import FlightRecord
 from ahv_analysis.signals import Settings
+from ahv_analysis.summary import failure
+from ahv_analysis.tally import Cause
 from ahv_plant.constants import DEGREES
 
 TUMBLING_RATE = 60.0 / DEGREES  # [rad/s] body rate at which a vehicle is lost
@@ -36,6 +38,8 @@ class Flight(NamedTuple):
     notes: dict[str, Any]  # empty in a bag without notes
     case: Case | None  # likewise None
     metrics: dict[str, Any]
+    ended_early: str  # why, empty if it did not
+    cause: Cause | None  # of its failure, as in a campaign; None without a case
 
     @property
     def settings(self) -> Settings:
@@ -46,12 +50,14 @@ class Flight(NamedTuple):
     def verdict(self) -> Verdict:
         """Success is Table 5.1's: flown to its end with |alpha| <= 5 deg throughout."""
         unstart = self.metrics["margins"]["alpha"]["first_beyond_s"]
-        ended_early = why_ended_early(self.record, self.case) if self.case else ""
-        if unstart is not None:
-            reasons = [f"inlet unstart: |α| beyond 5° from {unstart:g} s", ended_early]
+        lost = self.cause == Cause.SURFACES_LOST_THE_VEHICLE
+        reasons = [
+            "" if unstart is None else f"inlet unstart: |α| beyond 5° from {unstart:g} s",
+            "the surfaces lost the vehicle" if lost else "",
+            self.ended_early,
+        ]
+        if any(reasons):
             return Verdict("failure", "; ".join(filter(None, reasons)))
-        if ended_early:
-            return Verdict("failure", ended_early)
         if self.case is None:
             return Verdict(
                 "open",
@@ -80,7 +86,10 @@ def _read(bag: Path, name: str) -> Flight:
     if record.steps < 1:
         raise BagError(f"{bag} holds no two steps with all their messages: there was no flight")
     case = make_case(notes["case"], notes["parameters"]) if notes else None
-    return Flight(name, bag, record, notes, case, measure(record, case.control if case else None))
+    metrics = measure(record, case.control if case else None)
+    ended_early = why_ended_early(record, case) if case else ""
+    cause = failure(record, ended_early, case.control) if case else None
+    return Flight(name, bag, record, notes, case, metrics, ended_early, cause)
 
 
 def page_names(bags: Sequence[Path]) -> list[str]:

@@ -79,6 +79,27 @@ print(json.dumps(counts))
 """
 
 
+CAMPAIGN = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from resource import RUSAGE_SELF, getrusage
+from tempfile import TemporaryDirectory
+
+from ahv_analysis.campaign import Campaign, fly_campaign
+from ahv_analysis.campaign_summary import summarize_campaign
+from ahv_analysis.case import load_case
+
+case = load_case("neuro_adaptive_sc_gdi", {"duration": 1.0})
+campaign = Campaign(case, 0.3, int(sys.argv[1]), 1)
+with TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
+    fly_campaign(campaign, Path(folder), pool)
+    fly_campaign(campaign, Path(folder), pool)
+    assert summarize_campaign(campaign, Path(folder))["runs"] == campaign.runs
+print(getrusage(RUSAGE_SELF).ru_maxrss // 1024)
+"""
+
+
 @intrinsic
 def fused(typingctx, a, b, c):
     """Fused multiply-add of lanes, which nothing but this measurement uses."""
@@ -215,12 +236,23 @@ def bench_lanes() -> None:
     print(f"Table 5.1, {total} trials, projected: {total * steps / pace:.0f} s")
 
 
+def bench_memory() -> None:
+    """Peak memory of the process that flies, resumes and sums up a campaign."""
+    print("\nMemory of a campaign of flights of 1 s")
+    for runs in (2_000, 50_000, 200_000):
+        flown = subprocess.run(
+            [sys.executable, "-c", CAMPAIGN, str(runs)], capture_output=True, text=True, check=True
+        )
+        print(f"{runs:7} runs{int(flown.stdout):8} MB at most")
+
+
 def main() -> None:
     """Measure everything."""
     os.environ.setdefault("ROS_DOMAIN_ID", "99")
     bench_graph()
     bench_bags()
     bench_lanes()
+    bench_memory()
 
 
 if __name__ == "__main__":

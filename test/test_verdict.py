@@ -5,8 +5,9 @@ import pytest
 
 from ahv_analysis.block import fly_alone
 from ahv_analysis.case import load_case
-from ahv_analysis.flight import fly
+from ahv_analysis.flight import fly, fly_library
 from ahv_analysis.record import record
+from ahv_analysis.report_flight import read_flights
 from ahv_analysis.summary import summarize
 from ahv_analysis.tally import Cause
 
@@ -46,3 +47,12 @@ def test_a_flight_that_leaves_the_model_later_has_that_verdict_too():
     case = case._replace(plant=case.plant._replace(initial=dive))
     assert len(list(fly(case))) > 1
     assert verdicts(case) == ("left_the_atmosphere_model", "left_the_atmosphere_model")
+
+
+def test_a_report_says_that_the_surfaces_lost_a_vehicle(tmp_path):
+    case = load_case("nominal_di", SHORT)
+    slow = case.plant.initial._replace(u=1.0, w=0.0)
+    fly_library(case._replace(plant=case.plant._replace(initial=slow)), tmp_path / "bag")
+    (flight,) = read_flights([tmp_path / "bag"])
+    assert flight.verdict.word == "failure"
+    assert "the surfaces lost the vehicle" in flight.verdict.reason
