@@ -17,7 +17,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.experimental import EventsExecutor
 
-from ahv_analysis.case import Case, notes
+from ahv_analysis.case import Case, config_folder, notes
 from ahv_analysis.errors import GraphError
 from ahv_analysis.faulty_node import faulty
 from ahv_msgs_py.base_node import REALTIME, quality
@@ -65,7 +65,7 @@ def _run_node(
 
 
 def set_transport(realtime: bool) -> None:
-    """Choose what carries the messages of the processes to be started, unless it is chosen.
+    """Choose how the processes to be started find and hear each other, unless it is chosen.
 
     In real time UDP on the loopback: through shared memory a node that was killed and started
     again is not heard by some of the others for seconds.
@@ -73,6 +73,8 @@ def set_transport(realtime: bool) -> None:
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     if realtime:
         os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+        profile = config_folder() / "fastdds" / "realtime.xml"
+        os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(profile))
 
 
 class ProcessGraph:
