@@ -186,9 +186,7 @@ def rerun(
     campaign = open_campaign(folder, level)
     row = find_run(campaign, folder, run)
     if row is None:
-        raise UsageError(
-            f"run {run} is not in {folder}, which holds runs 0 to {campaign.runs - 1}"
-        )
+        raise UsageError(f"run {run} is not in {folder}, whose last run is {campaign.runs - 1}")
     case = campaign.case_of(run)
     tally = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
     alone = flight_columns(
