@@ -1,14 +1,15 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""Writing a bag: message bytes as they come, on disk a tenth of a second later at the latest."""
+"""Writing a bag: message bytes as they come, in chunks."""
 
 import shutil
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from itertools import groupby
 from math import ceil
 from pathlib import Path
-from threading import Event, Thread
+from queue import SimpleQueue
+from threading import Thread
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ from ahv_analysis.bag_metadata import (
     write_metadata,
 )
 from ahv_analysis.errors import BagError
-from ahv_analysis.mcap_file import McapFile
+from ahv_analysis.mcap_file import Index, McapFile
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
 
@@ -51,8 +52,8 @@ _QOS = Qos(
     _FOREVER,
     False,
 )
-PERIOD = 0.1  # [s] of wall time between chunks
 LONGEST = 1000  # messages of a topic in one chunk: what a damaged chunk takes with it
+_Chunk = tuple[bytes, Index]  # message records, and where they are
 _STAMP = np.dtype([("seconds", "<i4"), ("nanoseconds", "<u4")])
 
 
@@ -70,12 +71,14 @@ class BagWriter:
     Messages are filed under simulated time: their own stamp, or the last one seen where a type has
     none, so that two bags of one flight are alike and play back at the vehicle's pace.
 
-    A thread files what has come as one chunk every `PERIOD`, so that nobody who writes ever waits
-    for the disk; it needs the interpreter for about a millisecond a chunk. When the disk fails,
-    `failure` says so in one sentence, `write` and `close` raise it, and what is on disk stays.
+    `flush` makes chunks of what has come and writes them; in the `background` a thread compresses
+    and writes them, so that nobody ever waits for the disk. That is for real time: beside a flight
+    as fast as it can, a thread contends for the interpreter, at several times what it does there.
+    When the disk fails, `failure` says so in one sentence, `write` and `close` raise it, and what
+    is on disk stays.
     """
 
-    def __init__(self, path: Path, notes: str = ""):
+    def __init__(self, path: Path, notes: str = "", background: bool = False):
         """Create the bag folder `path`; BagError if it exists or cannot be made.
 
         `notes` are filed with the bag; `ahv fly` writes the parameters of the flight there as
@@ -101,9 +104,11 @@ class BagWriter:
             raise BagError(f"cannot write a bag to {path}: it exists already") from error
         except OSError as error:
             raise BagError(f"cannot write a bag to {path}: {error.strerror}") from error
-        self._closing = Event()
+        self._pending: SimpleQueue[_Chunk | None] = SimpleQueue()
         self._thread = Thread(target=self._work, name="bag writer", daemon=True)
-        self._thread.start()
+        self._background = background
+        if background:
+            self._thread.start()
 
     def _begin(self) -> None:
         """File notes, message definitions and topics, before any message."""
@@ -132,10 +137,22 @@ class BagWriter:
         self._inboxes[topic].messages.extend(messages)
         self.counts[topic] += len(messages)
 
+    def flush(self) -> None:
+        """Bring what has come to the disk, or on its way there in the background."""
+        most = max(len(inbox.messages) for inbox in self._inboxes.values())
+        for _ in range(ceil(most / LONGEST)):
+            chunk = self._chunk()
+            if self._background:
+                self._pending.put(chunk)
+            else:
+                self._add(chunk)
+
     def close(self) -> None:
         """Write index and metadata; after this the bag is complete. BagError if it cannot be."""
-        self._closing.set()
-        self._thread.join()
+        self.flush()
+        if self._background:
+            self._pending.put(None)
+            self._thread.join()
         if self.failure is None:
             self._guarded(self._finish)
         if self.failure is not None:
@@ -143,8 +160,12 @@ class BagWriter:
             raise self.failure
 
     def _work(self) -> None:
-        while not self._closing.wait(PERIOD) and self.failure is None:
-            self._guarded(self._add_chunks)
+        for chunk in iter(self._pending.get, None):
+            self._add(chunk)
+
+    def _add(self, chunk: _Chunk) -> None:
+        if self.failure is None:
+            self._guarded(partial(self._file.add_chunk, *chunk))
 
     def _guarded(self, task: Callable[[], None]) -> None:
         try:
@@ -157,7 +178,6 @@ class BagWriter:
             )
 
     def _finish(self) -> None:
-        self._add_chunks()
         self._file.add_metadata(metadata_record(self._metadata()))
         self._file.finish()
         write_metadata(self.path, self._metadata())
@@ -166,20 +186,14 @@ class BagWriter:
         file = BagFile(self._name, self._file.contents, self._topics)
         return bag_metadata([file], self._custom)
 
-    def _add_chunks(self) -> None:
-        """File all messages that have come."""
-        most = max(len(inbox.messages) for inbox in self._inboxes.values())
-        for _ in range(ceil(most / LONGEST)):
-            self._add_chunk()
-
-    def _add_chunk(self) -> None:
-        """File messages topic by topic; the index tells their order."""
+    def _chunk(self) -> _Chunk:
+        """Take messages topic by topic; the index tells their order."""
         parts: list[bytes] = []
         index: dict[int, NDArray[np.uint64]] = {}
         size = 0
         for channel, stamp_offset, inbox in self._inboxes.values():
             messages = inbox[:LONGEST]
-            del inbox[: len(messages)]  # what comes meanwhile is behind them
+            del inbox[: len(messages)]
             entries = []
             for length, run in groupby(messages, len):
                 rows = _rows(channel, list(run), length)
@@ -191,7 +205,7 @@ class BagWriter:
                 size += rows.nbytes
             if entries:
                 index[channel] = np.concatenate(entries)
-        self._file.add_chunk(b"".join(parts), index)
+        return b"".join(parts), index
 
     def _times(self, data: NDArray[np.uint8], offset: int | None) -> NDArray[np.uint64]:
         """Log times (n,) [ns] of the messages `data` (n, length)."""

@@ -12,11 +12,12 @@ import numpy as np
 
 from ahv_analysis.campaign import RUNS_PER_JOB, Campaign, fly_runs
 from ahv_analysis.campaign_store import Columns
+from ahv_analysis.campaign_summary import exact_interval
 from ahv_analysis.case import Case, load_case, make_case
 from ahv_analysis.flight import fly
 from ahv_analysis.record import record
 from ahv_analysis.study import row
-from ahv_analysis.table import REPORT
+from ahv_analysis.table import CONTROLLERS, REPORT
 from ahv_control.flight_control import NEUTRAL, nominal_control
 from ahv_plant.compiled import kernel
 from ahv_plant.constants import (
@@ -35,7 +36,9 @@ SEED = 2017
 LEVEL, RUNS = 0.5, 3873  # of the protection; as many as the report flew at 40 %
 FULL_NOSE_DOWN = Surfaces(SURFACE_MINIMUM, SURFACE_MINIMUM, 0.0)
 LONGEST = 3000  # steps in which a nose comes down, if it does
+STARTS_FLOWN = 1000  # of section 3.5.2's random starts
 
+Triple = tuple[float, float, float]  # of P, Q, R
 
 FASTER = dict.fromkeys(("k_ap_P", "k_ap_Q", "k_ap_R"), 50.0)  # [1/s]
 STARTS: dict[str, Mapping[str, Mapping[str, object]]] = {
@@ -130,60 +133,83 @@ def changed(case: Case, changes: Mapping[str, Mapping[str, object]]) -> Case:
 
 
 def error_dynamics(
-    exponent: float, k_s: tuple[float, ...], k: float, k_ad: tuple[float, ...] | None = None
+    exponent: float, k_s: Triple, k: Triple, k_ad: Triple = (5.0, 7.0, 5.0)
 ) -> dict[str, dict[str, object]]:
-    """Parameters of eq 5.11 with the report's gains k [1/s], k_s in rad/s: both laws alike.
+    """Parameters of eq 5.11, taken by the letter: its gains k and k_ad, k_s in rad/s."""
 
-    Without `k_ad` the decay of X_a - X_d has the gain k as well.
-    """
-
-    def gains(prefix: str, values: tuple[float, ...]) -> dict[str, object]:
+    def gains(prefix: str, values: Triple) -> dict[str, object]:
         scaled = (a * b ** (2.0 - 2.0 * exponent) for a, b in zip(values, k_s, strict=True))
         return {f"{prefix}_{axis}": gain for axis, gain in zip("PQR", scaled, strict=True)}
 
     bounds = {f"k_s_{axis}": b * DEGREES for axis, b in zip("PQR", k_s, strict=True)}
-    tracking = {"lambda": exponent} | bounds | gains("k", (k,) * 3)
+    tracking = {"lambda": exponent} | bounds | gains("k", k)
     return {
-        "inner_loop": tracking | gains("k_ad", k_ad or (k,) * 3),
+        "inner_loop": tracking | gains("k_ad", k_ad),
         "disturbance_learner": tracking,
     }
 
 
-PRINTED = (0.1, 0.3, 0.1)
-K_AD = (5.0, 7.0, 5.0)
+def attitude_gain(k: float) -> dict[str, dict[str, object]]:
+    """Parameters of the intermediate loop [1/s]."""
+    return {"outer_intermediate": dict.fromkeys(("k_phi", "k_theta", "k_psi"), k)}
+
+
+PRINTED: Triple = (0.1, 0.3, 0.1)  # k_s, taken in rad/s
+TWO: Triple = (2.0, 2.0, 2.0)  # k, as printed
 READINGS: dict[str, Mapping[str, Mapping[str, object]]] = {
-    "as built: lambda 1.5, k_s 5 deg/s": {},
-    "lambda 0.001, k_s 0.1, 0.3, 0.1 rad/s": error_dynamics(0.001, PRINTED, 2.0, K_AD),
-    "the same, k in eq 5.14 too": error_dynamics(0.001, PRINTED, 2.0),
-    "gains of section 3.5.2, k_u 0.01": {"velocity": {"k_u": 0.01}},
-    "gains of section 3.5.2, k_phi, k_theta, k_psi 0.2": {
-        "outer_intermediate": dict.fromkeys(("k_phi", "k_theta", "k_psi"), 0.2)
-    },
-    "rates regulated to zero, section 5.1": {
-        "outer_intermediate": dict.fromkeys(("k_phi", "k_theta", "k_psi"), 0.0)
-    },
+    "as built: lambda 1.5, K 2, 6.67, 2": {},
+    "lambda 1: dynamic inversion, K 2": error_dynamics(1.0, PRINTED, TWO),
+    "lambda 1, K 50": error_dynamics(1.0, PRINTED, (50.0, 50.0, 50.0)),
+    "lambda 1.5, by the letter: K 20, 6.67, 20": error_dynamics(1.5, PRINTED, TWO),
+    "lambda 0.001, k_s in rad/s": error_dynamics(0.001, PRINTED, TWO),
+    "the same, k in eq 5.14 too": error_dynamics(0.001, PRINTED, TWO, TWO),
+    "k_u 0.01, as in section 3.5.2": {"velocity": {"k_u": 0.01}},
+    "k_phi, k_theta, k_psi 0.2, as there": attitude_gain(0.2),
+    "rates regulated to zero, section 5.1": attitude_gain(0.0),
 }
+MANY = range(1, 6)  # seeds of a count that chance has less part in
+
+
+def succeeded(campaign: Campaign) -> Columns:
+    """Columns of the runs of a campaign, with whether each was a success."""
+    parts = list(fly_parts(campaign))
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return columns | {"success": columns["cause"] == 0}
 
 
 def study_readings() -> None:
-    """Readings of section 5.2 at the report's numbers of trials."""
+    """Readings of section 5.2 at the report's numbers of trials, and from random starts."""
     levels = [reported for reported in REPORT if reported.level in (0.3, 0.4)]
     names = [f"success at {reported.level:.0%}, %" for reported in levels]
+    starts = f"of {STARTS_FLOWN} random starts at 30 %, lost"
     print(f"\nReadings of SC-GDI, seed {SEED}; |h - h*| at the end, of the successes at 40 %\n")
-    row("reading", *names, "95 % within m")
-    row(*["---"] * (len(levels) + 2))
+    row("reading", *names, "95 % within m", starts)
+    row(*["---"] * (len(levels) + 3))
     built = load_case("neuro_adaptive_sc_gdi")
     cases = {name: changed(built, changes) for name, changes in READINGS.items()}
-    cases["lambda 0.001, k_s 0.1, 0.3, 0.1 deg/s"] = load_case("neuro_adaptive_sc_gdi_literal")
+    cases["lambda 0.001, k_s in deg/s"] = load_case("neuro_adaptive_sc_gdi_literal")
     for name, case in cases.items():
         rates = []
         for reported in levels:
-            parts = list(fly_parts(Campaign(case, reported.level, reported.trials, SEED)))
-            success = np.concatenate([part["cause"] == 0 for part in parts])
-            altitude = np.concatenate([part["final_altitude_m"] for part in parts])
-            rates.append(f"{100.0 * np.mean(success):.2f}")
-        missed = np.abs(altitude - case.control.outer.altitude)[success]
-        row(name, *rates, f"{np.percentile(missed, 95.0):.0f}")
+            flown = succeeded(Campaign(case, reported.level, reported.trials, SEED))
+            rates.append(f"{100.0 * np.mean(flown['success']):.2f}")
+        missed = np.abs(flown["final_altitude_m"] - case.control.outer.altitude)
+        within = np.percentile(missed[flown["success"]], 95.0)
+        random = Campaign(case, 0.3, STARTS_FLOWN, SEED, random_starts=True)
+        row(name, *rates, f"{within:.0f}", len(failed_runs(random)))
+    print(f"\nThe two controllers of the report over the draws of {len(MANY)} seeds\n")
+    row("controller", *names)
+    row(*["---"] * (len(levels) + 1))
+    for controller in CONTROLLERS:
+        case = load_case(controller)
+        cells = []
+        for reported in levels:
+            campaigns = [Campaign(case, reported.level, reported.trials, seed) for seed in MANY]
+            runs = len(campaigns) * reported.trials
+            kept = runs - sum(len(failed_runs(campaign)) for campaign in campaigns)
+            low, high = exact_interval(kept, runs)
+            cells.append(f"{100 * kept / runs:.2f} [{100 * low:.2f}, {100 * high:.2f}]")
+        row(controller, *cells)
 
 
 def main() -> None:

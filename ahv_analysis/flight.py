@@ -19,7 +19,7 @@ from ahv_control.flight_control import (
 )
 from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learner_values
-from ahv_msgs_py.layout import NANOSECONDS, clock_bytes
+from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
     CLOCK,
@@ -35,6 +35,8 @@ from ahv_plant.constants import STEP, STEP_NS
 from ahv_plant.departure import departure_reason
 from ahv_plant.state import State
 from ahv_plant.vehicle import vehicle_step
+
+CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
 
 
 class Step(NamedTuple):
@@ -84,7 +86,8 @@ def fly_library(
     try:
         for step in fly(case):
             write_step(bag, step)
-            if step.stamp % NANOSECONDS == 0:
+            if (step.stamp + STEP_NS) % CHUNK == 0:
+                bag.flush()
                 progress(step.stamp // STEP_NS)
     finally:
         bag.close()  # whole up to here, even if the flight is interrupted

@@ -10,9 +10,11 @@ import time
 from pathlib import Path
 
 import pytest
+import rclpy
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
+from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.bag_reader import read_bag
 from ahv_analysis.bag_recovery import recover
@@ -22,7 +24,8 @@ from ahv_analysis.errors import BagError
 from ahv_analysis.flight import fly, fly_library
 from ahv_analysis.graph_flight import fly_graph
 from ahv_analysis.record import record
-from ahv_analysis.recorder_node import CONTINUE
+from ahv_analysis.recorder_node import CONTINUE, RecorderNode
+from ahv_msgs_py.base_node import quality
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, STATE
@@ -54,15 +57,32 @@ def messages_in(file):
     return found
 
 
-def test_a_message_is_on_disk_soon_though_nothing_follows_it(tmp_path):
+def test_a_message_is_on_disk_soon_though_nothing_follows_it(tmp_path, domain):
     """As in a paused flight: neither a later message nor the end of the bag is needed."""
-    bag = BagWriter(tmp_path / "bag")
-    bag.write(CLOCK.name, clock_bytes(10))
-    wait_for(lambda: messages_in(mcap_of(tmp_path / "bag")) == [clock_bytes(10)])
-    bag.write(CLOCK.name, clock_bytes(20), clock_bytes(30))
-    expected = [clock_bytes(stamp) for stamp in (10, 20, 30)]
-    wait_for(lambda: messages_in(mcap_of(tmp_path / "bag")) == expected)
-    bag.close()
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    recorder = RecorderNode({"bag": str(tmp_path / "bag")}, context)
+    executor = EventsExecutor(context=context)
+    executor.add_node(recorder)
+    recorder.bring_up()
+    sender = recorder.publisher(CLOCK.type_name, CLOCK.name, quality(durable=True))
+
+    def clocks_on_disk(*stamps):
+        executor.spin_once(0.01)
+        found = messages_in(mcap_of(tmp_path / "bag"))
+        return [data for data in found if len(data) == len(clock_bytes(0))] == [
+            clock_bytes(stamp) for stamp in stamps
+        ]
+
+    sender.publish(clock_bytes(10))
+    wait_for(lambda: clocks_on_disk(10))
+    sender.publish(clock_bytes(20))
+    sender.publish(clock_bytes(30))
+    wait_for(lambda: clocks_on_disk(10, 20, 30))
+    executor.remove_node(recorder)
+    executor.shutdown()
+    recorder.destroy_node()
+    rclpy.shutdown(context=context)
 
 
 def test_killed_recorders_leave_bags_that_recover(tmp_path, domain):
