@@ -1,6 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """A flight on the ROS graph, one process per node."""
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -61,7 +62,16 @@ def _run_node(
     os.environ.update(environment)
     sys.argv = [name]
     kind = faulty(node_class(name)) if can_fail and name != "recorder" else node_class(name)
-    run(lambda: kind(values))
+    code: object = 0
+    try:
+        run(lambda: kind(values))
+    except SystemExit as end:
+        code = end.code
+    # A forked process ends without finalizing Python, and what holds DDS would stay in /dev/shm.
+    gc.unfreeze()
+    gc.collect()
+    rclpy.get_default_context().destroy()
+    sys.exit(code)
 
 
 def set_transport(realtime: bool) -> None:

@@ -4,6 +4,7 @@
 import os
 import signal
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from ahv_analysis.flight import fly
 from ahv_analysis.process_flight import ProcessGraph, fly_processes, set_transport
 from ahv_analysis.record import record
 from ahv_msgs_py.faults import PERIOD
+from ahv_msgs_py.node_process import PRIORITY
 from ahv_msgs_py.topics import SURFACE_COMMAND
 from ahv_plant.constants import DEGREES, STEP_NS
 
@@ -107,6 +109,37 @@ def test_every_controller_can_be_killed_and_started_again(tmp_path):
                 assert away(spectator, calm) < 1.0, name
                 assert spectator.max_abs_alpha * DEGREES < 5.0, name
                 assert graph.ended() == {}, name
+            graph.end_flight()
+    finally:
+        spectator.close()
+
+
+def may_take_precedence():
+    try:
+        before = os.sched_getscheduler(0), os.sched_getparam(0)
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, *before)
+    except PermissionError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_in_real_time_every_thread_of_a_node_goes_before_ordinary_ones(realtime):
+    """Where the system permits it; in lockstep there is no hurry."""
+    set_transport(realtime)
+    spectator = Spectator()
+    fifo = realtime and may_take_precedence()
+    try:
+        case = load_case("nominal_di", {"duration": 3600.0})
+        with ProcessGraph(case, None, realtime, spectators=1) as graph:
+            deadline = time.monotonic() + 30.0
+            while spectator.stamp < STEP_NS and time.monotonic() < deadline:
+                spectator.look(0.1)
+            for name, process in graph.processes.items():
+                threads = [int(task.name) for task in Path(f"/proc/{process.pid}/task").iterdir()]
+                policies = {os.sched_getscheduler(thread) for thread in threads}
+                assert policies == {os.SCHED_FIFO if fifo else os.SCHED_OTHER}, name
             graph.end_flight()
     finally:
         spectator.close()
