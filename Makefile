@@ -26,7 +26,7 @@ test: venv
 	$(BIN)/ruff format --check $(MODULES)
 	$(BIN)/mypy
 	$(BIN)/codespell $(MODULES) $(TEXTS)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m "unit and not compiled"
 	$(BIN)/coverage report
 

@@ -58,6 +58,7 @@ setup(
         "test": [
             "distributed",
             "pytest",
+            "pytest-xdist",  # two processes of tests
             "coverage",
             "hypothesis",
             "mcap-ros2-support",

@@ -23,6 +23,7 @@ from ahv_analysis.case import load_case
 from ahv_analysis.dataset import bag_dataset
 from ahv_analysis.flight import fly, fly_library
 from ahv_analysis.graph_flight import fly_graph
+from ahv_analysis.process_flight import fly_processes
 from ahv_analysis.table import REPORT
 from ahv_plant.compiled import kernel
 from ahv_plant.constants import STEP
@@ -145,7 +146,7 @@ def plain_python() -> None:
 
 
 def bench_graph() -> None:
-    """One flight at a time: library, graph, recorder."""
+    """One flight at a time: library, graph in one process and in several, recorder."""
     for name in ("nominal_di", "neuro_adaptive_sc_gdi"):
         case = load_case(name)
         steps = case.plant.steps
@@ -158,11 +159,13 @@ def bench_graph() -> None:
                     ("library", timed(lambda: list(fly(case)))),  # noqa: B023
                     ("graph, no recorder", fly_graph(case, None)[1]),
                     ("graph, recorder on", fly_graph(case, Path(folder) / str(number))[1]),
+                    ("a process per node", fly_processes(case, None)[1]),
+                    ("the same, recorder on", fly_processes(case, Path(folder) / f"p{number}")[1]),
                     ("plain Python reference", timed(plain_python)),
                 ):
                     walls.setdefault(engine, []).append(wall)
         reference = median(walls["plain Python reference"])
-        print(f"\n{name}: {steps} steps of {STEP} s, median of {ROUNDS}, one process")
+        print(f"\n{name}: {steps} steps of {STEP} s, median of {ROUNDS}")
         print(f"{'':24}{'wall s':>8}{'steps/s':>10}{'x real time':>13}{'x reference':>13}")
         for engine, measured in walls.items():
             wall = median(measured)

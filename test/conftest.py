@@ -11,6 +11,8 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 settings.register_profile("ahv", deadline=None, derandomize=True, print_blob=False)
 settings.load_profile("ahv")
 
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # tests run in two processes
+os.environ["ROS_DOMAIN_ID"] = str(99 + WORKER)  # of graphs that are not given a domain
 _domains = itertools.count(os.getpid())
 
 
@@ -24,4 +26,4 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture
 def domain():
     """A ROS domain that no other test of this run uses (above 101 ports are not safe)."""
-    return 1 + next(_domains) % 98
+    return 1 + (2 * next(_domains) + WORKER) % 98

@@ -29,7 +29,7 @@ ARRAYS = ("stamps", "states", "attitude_commands", "rate_commands", "surfaces", 
 def nominal(tmp_path_factory):
     """Bag of the nominal case, flown for 150 s on the graph."""
     bag = tmp_path_factory.mktemp("nominal") / "bag"
-    ended_early, _ = fly_graph(load_case("nominal_di"), bag, domain=101)
+    ended_early, _ = fly_graph(load_case("nominal_di"), bag)
     assert ended_early == ""
     return bag
 

@@ -35,10 +35,18 @@ def private(monkeypatch, domain):
     monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
 
 
-def test_processes_in_lockstep_fly_the_same_bits(tmp_path):
+def shared_memory(domain):
+    """What DDS holds of shared memory for the ports of a domain."""
+    ports = range(7400 + 250 * domain, 7400 + 250 * (domain + 1))
+    return {path for port in ports for path in Path("/dev/shm").glob(f"*fastrtps_port{port}*")}
+
+
+def test_processes_in_lockstep_fly_the_same_bits_and_leave_nothing(tmp_path, domain):
     case = load_case(CASE, {"duration": 5.0})
+    before = shared_memory(domain)
     ended_early, _ = fly_processes(case, tmp_path / "bag")
     assert ended_early == ""
+    assert shared_memory(domain) <= before
     flown, computed = read_bag(tmp_path / "bag"), record(fly(case), False)
     for name in ("stamps", "states", "surfaces", "throttle", "learner", "estimates"):
         assert np.array_equal(getattr(flown, name), getattr(computed, name)), name

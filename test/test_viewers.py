@@ -3,7 +3,6 @@
 
 import json
 import math
-import os
 import re
 from xml.etree import ElementTree
 
@@ -28,9 +27,7 @@ FUNCTIONS = {"rad2deg"}
 def bag(tmp_path_factory):
     """Bag of an adaptive flight on the graph, long enough for every topic."""
     path = tmp_path_factory.mktemp("viewers") / "bag"
-    fly_graph(
-        load_case("neuro_adaptive_sc_gdi", {"duration": 0.2}), path, domain=1 + os.getpid() % 98
-    )
+    fly_graph(load_case("neuro_adaptive_sc_gdi", {"duration": 0.2}), path)
     return path
 
 
