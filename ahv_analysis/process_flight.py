@@ -23,7 +23,7 @@ from ahv_analysis.errors import GraphError
 from ahv_analysis.faulty_node import faulty
 from ahv_msgs_py.base_node import REALTIME, quality
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.node_process import run
+from ahv_msgs_py.node_process import run, take_precedence
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
 from ahv_plant.constants import STEP_NS
@@ -61,6 +61,8 @@ def _run_node(
     """Be the process of a node; the server has the environment of when it was started."""
     os.environ.update(environment)
     sys.argv = [name]
+    if values[REALTIME.name]:
+        take_precedence()  # at once: a node that is started again in flight is missed
     kind = faulty(node_class(name)) if can_fail and name != "recorder" else node_class(name)
     code: object = 0
     try:
