@@ -146,7 +146,7 @@ def plain_python() -> None:
 
 
 def bench_graph() -> None:
-    """One flight at a time: library, graph in one process and in several, recorder."""
+    """One flight at a time: library, graph, recorder."""
     for name in ("nominal_di", "neuro_adaptive_sc_gdi"):
         case = load_case(name)
         steps = case.plant.steps
@@ -159,13 +159,11 @@ def bench_graph() -> None:
                     ("library", timed(lambda: list(fly(case)))),  # noqa: B023
                     ("graph, no recorder", fly_graph(case, None)[1]),
                     ("graph, recorder on", fly_graph(case, Path(folder) / str(number))[1]),
-                    ("a process per node", fly_processes(case, None)[1]),
-                    ("the same, recorder on", fly_processes(case, Path(folder) / f"p{number}")[1]),
                     ("plain Python reference", timed(plain_python)),
                 ):
                     walls.setdefault(engine, []).append(wall)
         reference = median(walls["plain Python reference"])
-        print(f"\n{name}: {steps} steps of {STEP} s, median of {ROUNDS}")
+        print(f"\n{name}: {steps} steps of {STEP} s, median of {ROUNDS}, one process")
         print(f"{'':24}{'wall s':>8}{'steps/s':>10}{'x real time':>13}{'x reference':>13}")
         for engine, measured in walls.items():
             wall = median(measured)
@@ -178,6 +176,18 @@ def bench_graph() -> None:
             f"recording costs {median(costs):.0%} of the rate without it, median of pairs "
             f"({min(costs):.0%} to {max(costs):.0%})"
         )
+
+
+def bench_processes() -> None:
+    """The graph with a process for each of its five nodes, and a sixth for the recorder."""
+    case = load_case("neuro_adaptive_sc_gdi")
+    steps = case.plant.steps
+    print(f"\n{case.name}: {steps} steps of {STEP} s, median of 3, one process per node")
+    with tempfile.TemporaryDirectory() as folder:
+        bags = [Path(folder) / str(number) for number in range(3)]
+        for engine, chosen in (("no recorder", [None] * 3), ("recorder on", bags)):
+            wall = median([fly_processes(case, bag)[1] for bag in chosen])
+            print(f"{engine:24}{wall:8.2f}{steps / wall:10.0f}{steps * STEP / wall:13.1f}")
 
 
 def bench_bags() -> None:
@@ -253,6 +263,7 @@ def main() -> None:
     """Measure everything."""
     os.environ.setdefault("ROS_DOMAIN_ID", "99")
     bench_graph()
+    bench_processes()
     bench_bags()
     bench_lanes()
     bench_memory()
