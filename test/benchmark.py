@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 
 from ahv_analysis.bag_reader import read_bag
 from ahv_analysis.block import fly_alone, fly_block
-from ahv_analysis.campaign import Campaign, fly_campaign
+from ahv_analysis.campaign import Campaign, fly_campaign, fly_runs
 from ahv_analysis.case import load_case
 from ahv_analysis.dataset import bag_dataset
 from ahv_analysis.flight import fly, fly_library
@@ -87,7 +87,7 @@ from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from tempfile import TemporaryDirectory
 
-from ahv_analysis.campaign import Campaign, fly_campaign
+from ahv_analysis.campaign import Campaign, fly_campaign, fly_runs
 from ahv_analysis.campaign_summary import summarize_campaign
 from ahv_analysis.case import load_case
 
@@ -226,6 +226,7 @@ def bench_lanes() -> None:
     truth = case.plant.truth
     fly_block(starts, vehicles, case.plant.truth, case.control, 2)
     fly_alone(case.plant.initial, truth, case.control, 2)
+    fly_runs(campaign, 0, LANES)
     multiply_add(numbers, 10, result)
     lanes, alone, peaks = [], [], []
     for _ in range(ROUNDS):
