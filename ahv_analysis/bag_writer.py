@@ -105,9 +105,9 @@ class BagWriter:
         except OSError as error:
             raise BagError(f"cannot write a bag to {path}: {error.strerror}") from error
         self._pending: SimpleQueue[_Chunk | None] = SimpleQueue()
-        self._thread = Thread(target=self._work, name="bag writer", daemon=True)
-        self._background = background
+        self._thread: Thread | None = None
         if background:
+            self._thread = Thread(target=self._work, name="bag writer", daemon=True)
             self._thread.start()
 
     def _begin(self) -> None:
@@ -142,15 +142,15 @@ class BagWriter:
         most = max(len(inbox.messages) for inbox in self._inboxes.values())
         for _ in range(ceil(most / LONGEST)):
             chunk = self._chunk()
-            if self._background:
-                self._pending.put(chunk)
-            else:
+            if self._thread is None:
                 self._add(chunk)
+            else:
+                self._pending.put(chunk)
 
     def close(self) -> None:
         """Write index and metadata; after this the bag is complete. BagError if it cannot be."""
         self.flush()
-        if self._background:
+        if self._thread is not None:
             self._pending.put(None)
             self._thread.join()
         if self.failure is None:

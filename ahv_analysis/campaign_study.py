@@ -197,6 +197,12 @@ def study_readings() -> None:
         within = np.percentile(missed[flown["success"]], 95.0)
         random = Campaign(case, 0.3, STARTS_FLOWN, SEED, random_starts=True)
         row(name, *rates, f"{within:.0f}", len(failed_runs(random)))
+
+
+def study_draws() -> None:
+    """The report's two controllers over the draws of many seeds."""
+    levels = [reported for reported in REPORT if reported.level in (0.3, 0.4)]
+    names = [f"success at {reported.level:.0%}, %" for reported in levels]
     print(f"\nThe two controllers of the report over the draws of {len(MANY)} seeds\n")
     row("controller", *names)
     row(*["---"] * (len(levels) + 1))
@@ -216,6 +222,7 @@ def main() -> None:
     """Print all studies as Markdown tables."""
     study_protection()
     study_readings()
+    study_draws()
 
 
 if __name__ == "__main__":

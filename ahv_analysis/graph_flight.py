@@ -17,6 +17,7 @@ from ahv_analysis.flight import fly
 from ahv_analysis.process_flight import controllers, node_class
 from ahv_analysis.recorder_node import STOP, RecorderNode
 from ahv_msgs_py.base_node import REALTIME, BaseNode
+from ahv_msgs_py.node_process import DISCOVERY_RANGE
 from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
@@ -46,7 +47,7 @@ def fly_graph(
     GraphError if the graph stops and BagError if the disk fails; with `on_error` CONTINUE the
     flight goes on without a record then.
     """
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=domain)
     executor = EventsExecutor(context=context)

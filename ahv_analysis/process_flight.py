@@ -23,7 +23,7 @@ from ahv_analysis.errors import GraphError
 from ahv_analysis.faulty_node import faulty
 from ahv_msgs_py.base_node import REALTIME, quality
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.node_process import run, take_precedence
+from ahv_msgs_py.node_process import DISCOVERY_RANGE, run, take_precedence
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
 from ahv_plant.constants import STEP_NS
@@ -36,7 +36,6 @@ NODES = {
     "velocity": "ahv_control.velocity_node.VelocityNode",
     "plant": "ahv_plant.plant_node.PlantNode",
 }
-DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 LONGEST_START = 30.0  # [s] until the first state
 LONGEST_SILENCE = 10.0  # [s] without a sign of the plant, after which the graph has failed

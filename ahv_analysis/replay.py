@@ -34,6 +34,7 @@ from ahv_analysis.replay_result import Comparison, compare
 from ahv_msgs_py.base_node import BaseNode, message_class, quality
 from ahv_msgs_py.faults import Fault
 from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.node_process import DISCOVERY_RANGE
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import (
@@ -62,7 +63,6 @@ BATCH = 100  # steps that are fed before the answers are waited for
 LISTEN = 1.0  # [s] for other graphs, before anything is said where they could hear it
 LONGEST_SILENCE = 10.0  # [s] without an answer, after which the graph has failed
 LOOK = 0.2  # [s] between looks at the progress
-DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
 class Replay(NamedTuple):
@@ -132,16 +132,16 @@ def _context(
     arguments: Sequence[str], domain: int | None, hidden: bool
 ) -> Iterator[rclpy.Context]:
     """Context of its own; a hidden one is not discovered by anybody, and discovers nobody."""
-    before = os.environ.get(DISCOVERY)
-    os.environ[DISCOVERY] = "OFF" if hidden else before or "LOCALHOST"
+    before = os.environ.get(DISCOVERY_RANGE)
+    os.environ[DISCOVERY_RANGE] = "OFF" if hidden else before or "LOCALHOST"
     context = rclpy.Context()
     try:
         rclpy.init(args=list(arguments), context=context, domain_id=domain)
     finally:
         if before is None:
-            del os.environ[DISCOVERY]
+            del os.environ[DISCOVERY_RANGE]
         else:
-            os.environ[DISCOVERY] = before
+            os.environ[DISCOVERY_RANGE] = before
     try:
         yield context
     finally:

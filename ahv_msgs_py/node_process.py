@@ -17,6 +17,7 @@ from ahv_msgs_py.base_node import AUTOSTART, BaseNode
 from ahv_msgs_py.parameters import ParameterError
 
 LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
+DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # this machine alone, unless it is set
 PRIORITY = 20  # of real-time threads, 1 to 99; those of the kernel that serve the machine have 50
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -37,7 +38,7 @@ def run(node_class: Callable[[], BaseNode]) -> None:
 
     It configures and activates itself; with `autostart` false the lifecycle services do that.
     """
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
     stop = threading.Event()
     for number in SIGNALS:  # never in the middle of a message, and a second one changes nothing
         signal.signal(number, lambda *_: stop.set())

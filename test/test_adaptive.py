@@ -71,6 +71,14 @@ def test_the_decay_is_continuous_across_the_bound(scale, bound, exponent):
     assert abs(change) < 1e3 * step
 
 
+def test_sc_gdi_takes_eq_5_11_by_the_letter_in_pitch():
+    """With the printed k = 2 and k_s = 0.1, 0.3, 0.1 in SI units; roll and yaw keep K = k."""
+    tracking = load_case("neuro_adaptive_sc_gdi").control.inner.tracking
+    assert tracking.bound == pytest.approx((0.1, 0.3, 0.1), rel=1e-3)
+    by_the_letter = 2.0 * tracking.bound.Q ** (2.0 - 2.0 * tracking.exponent)
+    assert tracking.gain == pytest.approx((2.0, by_the_letter, 2.0), rel=1e-3)
+
+
 def test_the_gain_grows_towards_the_bound_only_above_one():
     gains = {
         exponent: [-decay(error, 2.0, 1.0, exponent) / error for error in (0.1, 0.5, 0.9)]
