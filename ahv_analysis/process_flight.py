@@ -23,8 +23,9 @@ from ahv_analysis.errors import GraphError
 from ahv_analysis.faulty_node import faulty
 from ahv_msgs_py.base_node import REALTIME, quality
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.node_process import DISCOVERY_RANGE, run, take_precedence
+from ahv_msgs_py.node_process import DISCOVERY_RANGE, run
 from ahv_msgs_py.parameters import Value
+from ahv_msgs_py.real_time import take_precedence
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
 from ahv_plant.constants import STEP_NS
 

@@ -37,6 +37,7 @@ from ahv_msgs_py.parameters import (
     Value,
     check_parameters,
 )
+from ahv_msgs_py.real_time import reserve_memory
 from ahv_msgs_py.stepwise import Fallback, RealTimeSteps, Stepwise, Values
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE, QUEUE_DEPTH, STATE, LoopTopic
 
@@ -44,7 +45,7 @@ REALTIME = Parameter("realtime", False, "100 Hz by the wall clock; if false, loc
 AUTOSTART = Parameter("autostart", True, "configure and activate when started as a process")
 SHELL_PARAMETERS = (REALTIME, AUTOSTART)
 REALTIME_DEPTH = 10  # messages kept by a receiver in real time: older ones would not be obeyed
-SENDER_DEPTH = 1000  # messages that a sender keeps for a receiver that is slow, as a recorder
+SENDER_DEPTH = 1000  # and by a sender there, for a receiver that is slow, as a recorder
 STATE_LOST_AFTER = 500_000_000  # [ns]
 
 
@@ -102,6 +103,7 @@ class BaseNode(LifecycleNode):
         except ParameterError as error:
             self.refusal = str(error)
         self.realtime = bool(self.settings.get(REALTIME.name))
+        self.sender_depth = SENDER_DEPTH if self.realtime else QUEUE_DEPTH
         self.now: int | None = None  # [ns] stamp of the newest state
         self.health = Health(time.monotonic_ns)
         self._state_heard = 0  # [ns] by the steady clock
@@ -110,7 +112,7 @@ class BaseNode(LifecycleNode):
         self._opened: list[Callable[[], object]] = []  # closes what `start` opened
         self._changed: dict[str, Value] = {}  # in flight, not yet in force
         self._diagnostics = self.create_publisher(
-            DiagnosticArray, DIAGNOSTICS.name, quality(durable=True)
+            DiagnosticArray, DIAGNOSTICS.name, quality(True, self.sender_depth)
         )
         self.add_on_set_parameters_callback(self._change)
         # an impossible transition is answered with a refusal; rclpy would end the process
@@ -200,6 +202,7 @@ class BaseNode(LifecycleNode):
         if self.realtime:
             timer = self.create_timer(1.0, self._watch)
             self._opened.append(partial(self.destroy_timer, timer))
+            reserve_memory()
             gc.collect()
             gc.freeze()  # what lives until the end need not be looked at again
             gc.disable()  # from here on `_watch` collects, between two steps
@@ -273,7 +276,7 @@ class BaseNode(LifecycleNode):
         Values that no receiver would take are not sent, and counted.
         """
         encode = topic.layout.encode
-        qos = quality(durable=False, depth=SENDER_DEPTH) if self.realtime else quality(True)
+        qos = quality(durable=not self.realtime, depth=self.sender_depth)
         publish = self.publisher(topic.layout.type_name, topic.name, qos, matched).publish
         low = min(low for low, _ in topic.bounds)
         high = max(high for _, high in topic.bounds)

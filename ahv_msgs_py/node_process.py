@@ -6,8 +6,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 
 import rclpy
 from rclpy.experimental import EventsExecutor
@@ -15,22 +13,11 @@ from rclpy.signals import SignalHandlerOptions
 
 from ahv_msgs_py.base_node import AUTOSTART, BaseNode
 from ahv_msgs_py.parameters import ParameterError
+from ahv_msgs_py.real_time import take_precedence
 
 LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # this machine alone, unless it is set
-PRIORITY = 20  # of real-time threads, 1 to 99; those of the kernel that serve the machine have 50
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
-def take_precedence() -> None:
-    """Have every thread of this process scheduled before all ordinary ones.
-
-    By the real-time policy SCHED_FIFO: root may, and who has a limit for it (`ulimit -r`). Where
-    the system does not permit it, threads stay ordinary ones.
-    """
-    for thread in Path("/proc/self/task").iterdir():
-        with suppress(PermissionError, ProcessLookupError):  # one may have ended meanwhile
-            os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(PRIORITY))
 
 
 def run(node_class: Callable[[], BaseNode]) -> None:

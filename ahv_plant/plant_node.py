@@ -10,6 +10,7 @@ import rclpy
 from geometry_msgs.msg import Point, Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
 from visualization_msgs.msg import Marker
 
 from ahv_msgs_py.base_node import BaseNode, message_class, quality
@@ -102,18 +103,18 @@ class PlantNode(BaseNode):
             steps = Stepwise([topic.name for topic in topics], self._answered)
             for topic in topics:
                 self.receive(topic, partial(self._take, steps, topic.name))
-        viewers = quality(durable=True)
+        viewers = quality(True, self.sender_depth)
         self._send_clock = self.publisher(CLOCK.type_name, CLOCK.name, viewers)
         self._odometry = self.publisher(ODOMETRY.type_name, ODOMETRY.name, viewers)
         self._odometry_enu = self.publisher(ODOMETRY_ENU.type_name, ODOMETRY_ENU.name, viewers)
         self._marker = self.publisher(MARKER.type_name, MARKER.name, viewers)
-        self._transform = self._transform_publisher()
+        self._transform = self._transform_publisher(viewers)
         self._send_state = self.sender(STATE, self._listeners_changed)
 
-    def _transform_publisher(self) -> Any:
+    def _transform_publisher(self, viewers: QoSProfile) -> Any:
         """Return a publisher of /tf, or None: tf2_msgs is part of ROS 2, but not on PyPI."""
         try:
-            return self.publisher(TRANSFORM.type_name, TRANSFORM.name, quality(durable=True))
+            return self.publisher(TRANSFORM.type_name, TRANSFORM.name, viewers)
         except ModuleNotFoundError:
             return None
 
@@ -140,14 +141,14 @@ class PlantNode(BaseNode):
         stamp = self.step * STEP_NS
         self.now = stamp
         self._send_clock.publish(clock_bytes(stamp))
-        if self.step % VIEWER_PERIOD == 0:
-            self._publish_for_viewers(stamp)
         if not self.realtime and stamp % NANOSECONDS == 0 and stamp:
             self.report_health(stamp)
         if self.realtime:
             self._published = time.monotonic_ns()
         self.health.state_came()
         self._send_state(stamp, self.state)
+        if self.step % VIEWER_PERIOD == 0:  # while the controllers are at work
+            self._publish_for_viewers(stamp)
 
     # Lockstep
 

@@ -14,8 +14,10 @@ from ahv_analysis.case import load_case
 from ahv_analysis.graph_flight import fly_graph
 from ahv_analysis.process_flight import LONGEST_START, ProcessGraph, Watcher, set_transport
 from ahv_msgs_py.topics import STATE
+from test.witness import STILL, Witness
 
 CASE = "neuro_adaptive_sc_gdi"
+LOOK = 0.2  # [s] between looks at the reports
 TICK = os.sysconf("SC_CLK_TCK")  # [1/s] of the counters of processor time
 PAGE = os.sysconf("SC_PAGE_SIZE")  # [B]
 
@@ -36,12 +38,34 @@ def resident(pid: int | str = "self") -> float:
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE / 1e6
 
 
+class Misses:
+    """Deadlines that the plant counts as missed, and when it did."""
+
+    def __init__(self, watcher: Watcher):
+        """`watcher` hears the plant's reports, one a second."""
+        self._watcher = watcher
+        self._heard, self._total, self._since = 0, 0, time.monotonic()
+        self.seconds: list[tuple[float, float]] = []  # [s] from report to report, with a miss
+
+    def look(self) -> None:
+        """Take the reports that have come since the last look."""
+        now = time.monotonic()
+        for _, name, _, _, facts in self._watcher.statuses[self._heard :]:
+            if name == "plant" and facts:
+                total = sum(int(facts.get(fault, 0)) for fault in ("late", "tick_missed"))
+                if total > self._total:
+                    self.seconds.append((self._since, now))
+                self._total, self._since = total, now
+        self._heard = len(self._watcher.statuses)
+
+
 def bench_realtime(seconds: int) -> None:
     """State to both commands at 100 Hz, a process per node, recorder on."""
     set_transport(realtime=True)
     case = load_case(CASE, {"duration": float(seconds)})
     watcher = Watcher()
-    with tempfile.TemporaryDirectory() as folder:
+    misses, witness = Misses(watcher), Witness()
+    with witness, tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
         with ProcessGraph(case, bag, realtime=True) as graph:
             deadline = time.monotonic() + LONGEST_START
@@ -53,11 +77,13 @@ def bench_realtime(seconds: int) -> None:
             started, taken = time.perf_counter(), stolen()
             used = before
             while watcher.over is None and "plant" not in graph.ended():
-                watcher.look(0.5)
+                watcher.look(LOOK)
+                misses.look()
                 alive = [n for n, p in graph.processes.items() if p.exitcode is None]
                 used = used | {n: processor_seconds(graph.processes[n].pid) for n in alive}
             wall, taken = time.perf_counter() - started, stolen() - taken
-            watcher.look(0.5)  # what the plant said last
+            watcher.look(LOOK)  # what the plant said last
+            misses.look()
         states = len(load_bag(bag).topics[STATE.name].messages)
     facts = watcher.over
     watcher.close()
@@ -73,6 +99,20 @@ def bench_realtime(seconds: int) -> None:
     )
     parts = ", ".join(f"{name} {100 * part:.1f}" for name, part in share.items())
     print(f"of one core                   {100 * sum(share.values()):.1f} % ({parts})")
+    print_machine(misses.seconds, witness, taken)
+
+
+def print_machine(missed: list[tuple[float, float]], witness: Witness, taken: float) -> None:
+    """Say what the machine did to a flight: `missed` seconds of it, time `taken` from it [s]."""
+    stood = sum(witness.stood_still(start - LOOK, end) for start, end in missed)
+    lengths = [1e3 * (end - start) for start, end in witness.stops]
+    print(
+        f"seconds with a miss           {len(missed)}, in {stood} the machine itself stood still"
+    )
+    print(
+        f"the machine stood still       {len(lengths)} times for more than {STILL * 1e3:g} ms, "
+        f"{max(lengths, default=0.0):.1f} ms at most, {sum(lengths):.0f} ms in all of its cores"
+    )
     print(
         f"load of the machine           {os.getloadavg()[0]:.2f}; "
         f"{taken:.2f} s of its processors went to other machines\n"

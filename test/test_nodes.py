@@ -1,6 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Nodes are managed by the standard lifecycle, and changed in flight at the border of a step."""
 
+import gc
 import math
 from functools import partial
 
@@ -15,9 +16,9 @@ from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.case import load_case
 from ahv_analysis.process_flight import NODES, controllers, node_class
-from ahv_msgs_py.base_node import message_class
+from ahv_msgs_py.base_node import SENDER_DEPTH, message_class
 from ahv_msgs_py.parameters import ParameterError
-from ahv_msgs_py.topics import LOOP_TOPICS
+from ahv_msgs_py.topics import CLOCK, DIAGNOSTICS, LOOP_TOPICS, ODOMETRY, STATE
 
 CASE = load_case("neuro_adaptive_di", {"duration": 20.0})
 
@@ -99,6 +100,24 @@ def graph(domain):
     yield make
     for one in graphs:
         one.close()
+
+
+@pytest.fixture
+def collecting():
+    """Garbage is collected again, which a node in real time does by itself."""
+    yield
+    gc.unfreeze()
+    gc.enable()
+
+
+@pytest.mark.usefixtures("collecting")
+def test_in_real_time_what_a_publisher_keeps_has_an_end(graph):
+    """Memory that grows in flight is asked for in flight."""
+    plant = graph("plant", plant={"realtime": True}).nodes["plant"]
+    plant.bring_up()
+    depths = {one.topic_name: one.qos_profile.depth for one in plant.publishers}
+    assert {STATE.name, CLOCK.name, ODOMETRY.name, DIAGNOSTICS.name} < depths.keys()
+    assert max(depths.values()) == SENDER_DEPTH
 
 
 @pytest.mark.parametrize("name", NODES)

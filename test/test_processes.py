@@ -18,7 +18,8 @@ from ahv_analysis.flight import fly
 from ahv_analysis.process_flight import PROFILES, ProcessGraph, fly_processes, set_transport
 from ahv_analysis.record import record
 from ahv_msgs_py.faults import PERIOD
-from ahv_msgs_py.node_process import DISCOVERY_RANGE, PRIORITY
+from ahv_msgs_py.node_process import DISCOVERY_RANGE
+from ahv_msgs_py.real_time import PRIORITY
 from ahv_msgs_py.topics import SURFACE_COMMAND
 from ahv_plant.constants import DEGREES, STEP_NS
 
@@ -150,6 +151,32 @@ def test_in_real_time_every_thread_of_a_node_goes_before_ordinary_ones(realtime)
                 threads = [int(task.name) for task in Path(f"/proc/{process.pid}/task").iterdir()]
                 policies = {os.sched_getscheduler(thread) for thread in threads}
                 assert policies == {os.SCHED_FIFO if fifo else os.SCHED_OTHER}, name
+            graph.end_flight()
+    finally:
+        spectator.close()
+
+
+def minor_faults(pid):
+    """How often a process has met a page of memory that it did not have."""
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[7])
+
+
+def test_in_real_time_no_step_asks_the_system_for_memory():
+    """From the first second on: a page that is new can cost more than a step's work."""
+    set_transport(realtime=True)
+    spectator = Spectator()
+    try:
+        case = load_case(CASE, {"duration": 3600.0})
+        with ProcessGraph(case, None, realtime=True, spectators=1) as graph:
+            deadline = time.monotonic() + 30.0
+            while spectator.stamp < 100 * STEP_NS and time.monotonic() < deadline:
+                spectator.look(0.1)
+            before = {name: minor_faults(graph.processes[name].pid) for name in graph.processes}
+            first = spectator.stamp // STEP_NS
+            spectator.look(5.0)
+            steps = spectator.stamp // STEP_NS - first
+            for name, process in graph.processes.items():
+                assert minor_faults(process.pid) - before[name] < steps / 10, name
             graph.end_flight()
     finally:
         spectator.close()
