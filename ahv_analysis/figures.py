@@ -152,8 +152,8 @@ STYLE = {
 def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
     """One figure with a line per flight; the last one is the subject, and its commands are dashed.
 
-    Other flights that ended early do not set the scale, and end with a cross where the vehicle was
-    lost.
+    A flight is drawn until the vehicle is lost, with a cross there; of flights that were lost or
+    ended early only the subject sets the scale.
     """
     subject = list(flights)[-1]
     longest = max(record.steps for record in flights.values())
@@ -165,17 +165,17 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
             seen = []
             for label, record in flights.items():
                 values = panel.values(record)
-                lost = record.steps < longest and label != subject
-                shown = slice(_flying(record) if lost else None)
-                time, drawn = record.time[shown], values[shown]
+                end = _flying(record)
+                lost = end < len(record.stamps) or (record.steps < longest and label != subject)
+                time, drawn = record.time[:end], values[:end]
                 axis.plot(time, drawn, color=COLOURS[label], label=label)
                 if lost:
                     axis.plot(time[-1], drawn[-1], "x", color=COLOURS[label])
-                else:
-                    seen.append(values)
+                if label == subject or not lost:
+                    seen.append(drawn)
                 if panel.command is not None and label == subject:
-                    command = panel.command(record)
-                    axis.plot(record.time, command, label="command", **COMMAND_STYLE)
+                    command = panel.command(record)[:end]
+                    axis.plot(time, command, label="command", **COMMAND_STYLE)
                     seen.append(command)
             _scale(axis, np.concatenate(seen), panel.bound if len(flights) > 1 else None)
             if panel.bound is not None:
