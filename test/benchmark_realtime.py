@@ -14,7 +14,7 @@ from ahv_analysis.case import load_case
 from ahv_analysis.graph_flight import fly_graph
 from ahv_analysis.process_flight import LONGEST_START, ProcessGraph, Watcher, set_transport
 from ahv_msgs_py.topics import STATE
-from test.witness import STILL, Witness
+from test.witness import STILL, Stop, machine_watched, stood_still
 
 CASE = "neuro_adaptive_sc_gdi"
 LOOK = 0.2  # [s] between looks at the reports
@@ -64,8 +64,8 @@ def bench_realtime(seconds: int) -> None:
     set_transport(realtime=True)
     case = load_case(CASE, {"duration": float(seconds)})
     watcher = Watcher()
-    misses, witness = Misses(watcher), Witness()
-    with witness, tempfile.TemporaryDirectory() as folder:
+    misses = Misses(watcher)
+    with machine_watched() as stops, tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
         with ProcessGraph(case, bag, realtime=True) as graph:
             deadline = time.monotonic() + LONGEST_START
@@ -99,13 +99,13 @@ def bench_realtime(seconds: int) -> None:
     )
     parts = ", ".join(f"{name} {100 * part:.1f}" for name, part in share.items())
     print(f"of one core                   {100 * sum(share.values()):.1f} % ({parts})")
-    print_machine(misses.seconds, witness, taken)
+    print_machine(misses.seconds, stops, taken)
 
 
-def print_machine(missed: list[tuple[float, float]], witness: Witness, taken: float) -> None:
+def print_machine(missed: list[tuple[float, float]], stops: list[Stop], taken: float) -> None:
     """Say what the machine did to a flight: `missed` seconds of it, time `taken` from it [s]."""
-    stood = sum(witness.stood_still(start - LOOK, end) for start, end in missed)
-    lengths = [1e3 * (end - start) for start, end in witness.stops]
+    stood = sum(stood_still(stops, start - LOOK, end) for start, end in missed)
+    lengths = [1e3 * (end - start) for start, end in stops]
     print(
         f"seconds with a miss           {len(missed)}, in {stood} the machine itself stood still"
     )

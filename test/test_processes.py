@@ -4,6 +4,7 @@
 import os
 import signal
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,23 @@ def test_a_controller_that_dies_in_lockstep_ends_the_flight(tmp_path):
     assert killed
 
 
+@contextmanager
+def watched(name, until, realtime=True):
+    """A flight that has got to a step and goes on for ever: its processes and a spectator."""
+    set_transport(realtime)
+    spectator = Spectator()
+    try:
+        case = load_case(name, {"duration": 3600.0})
+        with ProcessGraph(case, None, realtime, spectators=1) as graph:
+            deadline = time.monotonic() + 30.0
+            while spectator.stamp < until * STEP_NS and time.monotonic() < deadline:
+                spectator.look(0.1)
+            yield graph, spectator
+            graph.end_flight()
+    finally:
+        spectator.close()
+
+
 def node_pids():
     """Process of every node, from the family of this one's server."""
     import multiprocessing
@@ -98,31 +116,21 @@ def longest_outage(statuses):
 def test_every_controller_can_be_killed_and_started_again(tmp_path):
     """Within a second, in flight: the flight comes back to where it would have been."""
     calm = reference(150.0)
-    set_transport(realtime=True)
-    spectator = Spectator()
-    try:
-        case = load_case(CASE, {"duration": 3600.0})
-        with ProcessGraph(case, None, realtime=True, spectators=1) as graph:
-            deadline = time.monotonic() + 30.0
-            while spectator.stamp < 100 * STEP_NS and time.monotonic() < deadline:
-                spectator.look(0.1)
-            for name in NODES:
-                spectator.max_abs_alpha = 0.0
-                graph.kill(name)
-                graph.start(name)
-                until, seen = spectator.stamp + RECOVERY * 1e9, len(spectator.statuses)
-                spectator.look(3.0)
-                while away(spectator, calm) > 1.0 and spectator.stamp < until:
-                    spectator.look(0.5)
-                outage = longest_outage(spectator.statuses[seen:])
-                if away(spectator, calm) > 1.0 and outage > LONGEST_OUTAGE:
-                    pytest.skip(f"this machine took {outage:g} s to start {name} again")
-                assert away(spectator, calm) < 1.0, name
-                assert spectator.max_abs_alpha * DEGREES < 5.0, name
-                assert graph.ended() == {}, name
-            graph.end_flight()
-    finally:
-        spectator.close()
+    with watched(CASE, 100) as (graph, spectator):
+        for name in NODES:
+            spectator.max_abs_alpha = 0.0
+            graph.kill(name)
+            graph.start(name)
+            until, seen = spectator.stamp + RECOVERY * 1e9, len(spectator.statuses)
+            spectator.look(3.0)
+            while away(spectator, calm) > 1.0 and spectator.stamp < until:
+                spectator.look(0.5)
+            outage = longest_outage(spectator.statuses[seen:])
+            if away(spectator, calm) > 1.0 and outage > LONGEST_OUTAGE:
+                pytest.skip(f"this machine took {outage:g} s to start {name} again")
+            assert away(spectator, calm) < 1.0, name
+            assert spectator.max_abs_alpha * DEGREES < 5.0, name
+            assert graph.ended() == {}, name
 
 
 def may_take_precedence():
@@ -138,22 +146,12 @@ def may_take_precedence():
 @pytest.mark.parametrize("realtime", [False, True])
 def test_in_real_time_every_thread_of_a_node_goes_before_ordinary_ones(realtime):
     """Where the system permits it; in lockstep there is no hurry."""
-    set_transport(realtime)
-    spectator = Spectator()
     fifo = realtime and may_take_precedence()
-    try:
-        case = load_case("nominal_di", {"duration": 3600.0})
-        with ProcessGraph(case, None, realtime, spectators=1) as graph:
-            deadline = time.monotonic() + 30.0
-            while spectator.stamp < STEP_NS and time.monotonic() < deadline:
-                spectator.look(0.1)
-            for name, process in graph.processes.items():
-                threads = [int(task.name) for task in Path(f"/proc/{process.pid}/task").iterdir()]
-                policies = {os.sched_getscheduler(thread) for thread in threads}
-                assert policies == {os.SCHED_FIFO if fifo else os.SCHED_OTHER}, name
-            graph.end_flight()
-    finally:
-        spectator.close()
+    with watched("nominal_di", 1, realtime) as (graph, _):
+        for name, process in graph.processes.items():
+            threads = [int(task.name) for task in Path(f"/proc/{process.pid}/task").iterdir()]
+            policies = {os.sched_getscheduler(thread) for thread in threads}
+            assert policies == {os.SCHED_FIFO if fifo else os.SCHED_OTHER}, name
 
 
 def minor_faults(pid):
@@ -163,23 +161,13 @@ def minor_faults(pid):
 
 def test_in_real_time_no_step_asks_the_system_for_memory():
     """From the first second on: a page that is new can cost more than a step's work."""
-    set_transport(realtime=True)
-    spectator = Spectator()
-    try:
-        case = load_case(CASE, {"duration": 3600.0})
-        with ProcessGraph(case, None, realtime=True, spectators=1) as graph:
-            deadline = time.monotonic() + 30.0
-            while spectator.stamp < 100 * STEP_NS and time.monotonic() < deadline:
-                spectator.look(0.1)
-            before = {name: minor_faults(graph.processes[name].pid) for name in graph.processes}
-            first = spectator.stamp // STEP_NS
-            spectator.look(5.0)
-            steps = spectator.stamp // STEP_NS - first
-            for name, process in graph.processes.items():
-                assert minor_faults(process.pid) - before[name] < steps / 10, name
-            graph.end_flight()
-    finally:
-        spectator.close()
+    with watched(CASE, 100) as (graph, spectator):
+        before = {name: minor_faults(node.pid) for name, node in graph.processes.items()}
+        first = spectator.stamp // STEP_NS
+        spectator.look(5.0)
+        steps = spectator.stamp // STEP_NS - first
+        for name, node in graph.processes.items():
+            assert minor_faults(node.pid) - before[name] < steps / 10, name
 
 
 def test_a_short_fault_campaign_passes(tmp_path):

@@ -5,11 +5,11 @@ import gc
 import multiprocessing
 import os
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
-from types import TracebackType
 
+Stop = tuple[float, float]  # [s] of `time.monotonic`, from when to when a core did not run
 PERIOD = 0.002  # [s] of its timers
 STILL = 0.002  # [s] late, from which on the machine is said to have stood still
 PRIORITY = 60  # above all nodes, and above what the kernel does in threads of its own (50)
@@ -21,7 +21,7 @@ def _watch_core(core: int, results: Connection) -> None:
     with suppress(PermissionError):  # then a busy machine looks like one that stands still
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     gc.disable()
-    still: list[tuple[float, float]] = []
+    still: list[Stop] = []
     due = time.monotonic()
     while not results.poll():
         due += PERIOD
@@ -33,39 +33,30 @@ def _watch_core(core: int, results: Connection) -> None:
     results.send(still)
 
 
-class Witness:
-    """A timer on every core that nothing on this machine can hold up.
+@contextmanager
+def machine_watched() -> Iterator[list[Stop]]:
+    """Have a timer on every core that nothing on this machine can hold up; stops are in the list.
 
     When one is late all the same, then the core did not run: a hypervisor gave it to another
-    machine. What a flight misses then says nothing of the flight.
+    machine. What a flight misses then says nothing of the flight. The list is filled at the end.
     """
-
-    def __init__(self) -> None:
-        """No stop has been seen yet."""
-        self.stops: list[tuple[float, float]] = []  # [s] of `time.monotonic`, of all cores
-        self._cores: list[tuple[BaseProcess, Connection]] = []
-
-    def __enter__(self) -> "Witness":
-        context = multiprocessing.get_context("spawn")  # the threads of DDS cannot be forked
-        for core in sorted(os.sched_getaffinity(0)):
-            ours, theirs = context.Pipe()
-            process = context.Process(target=_watch_core, args=(core, theirs), daemon=True)
-            process.start()
-            self._cores.append((process, ours))
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        for process, results in self._cores:
+    context = multiprocessing.get_context("spawn")  # the threads of DDS cannot be forked
+    stops: list[Stop] = []
+    watchers = []
+    for core in sorted(os.sched_getaffinity(0)):
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_watch_core, args=(core, theirs), daemon=True)
+        process.start()
+        watchers.append((process, ours))
+    try:
+        yield stops
+    finally:
+        for process, results in watchers:
             results.send(None)
-            self.stops += results.recv()
+            stops += results.recv()
             process.join()
-        self.stops.sort()
 
-    def stood_still(self, start: float, end: float) -> bool:
-        """Whether a core did at any time from `start` to `end` [s of `time.monotonic`]."""
-        return any(since < end and until > start for since, until in self.stops)
+
+def stood_still(stops: list[Stop], start: float, end: float) -> bool:
+    """Whether a core did at any time from `start` to `end` [s of `time.monotonic`]."""
+    return any(since < end and until > start for since, until in stops)
