@@ -414,7 +414,9 @@ def test_a_run_can_be_flown_on_the_graph(tmp_path):
 
 def test_ctrl_c_keeps_what_was_flown(tmp_path):
     out, case = tmp_path / "campaign", short_case(tmp_path, "nominal_di", "1.0")
-    command = (AHV, "monte-carlo", "--controller", case, "--runs", "9000000", "--out", out)
+    heard = ("env", "--default-signal=INT")  # also where tests run in the background of a shell
+    command = (*heard, AHV, "monte-carlo", "--controller", case)
+    command = (*command, "--runs", "9000000", "--out", out)
     process = subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60
     while not part_files(out / "runs-0.3") and time.monotonic() < deadline:
