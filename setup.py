@@ -4,7 +4,7 @@
 import sys
 from glob import glob
 
-from setuptools import setup
+from setuptools import find_packages, setup
 
 NAME = "ahv"
 NODES = {
@@ -13,7 +13,7 @@ NODES = {
     "disturbance_learner": "ahv_control.disturbance_learner_node",
     "inner_loop": "ahv_control.inner_loop_node",
     "velocity": "ahv_control.velocity_node",
-    "recorder": "ahv_analysis.recorder_node",
+    "recorder": "ahv_analysis.bag.recorder_node",
 }
 DATA = [
     ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -31,9 +31,9 @@ setup(
     description="Flight software for an air-breathing hypersonic vehicle as a ROS 2 node graph",
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
-    packages=["ahv_plant", "ahv_control", "ahv_msgs_py", "ahv_analysis"],
+    packages=find_packages(include=["ahv_*"]),
     # template, style and script of `ahv report`; uPlot (MIT) among them, for it is not on PyPI
-    package_data={"ahv_analysis": ["page/*"]},
+    package_data={"ahv_analysis.report": ["template/*"]},
     data_files=DATA,
     install_requires=[
         "setuptools",
@@ -80,7 +80,7 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "ahv = ahv_analysis.command:main",
+            "ahv = ahv_analysis.command.main:main",
             *(f"{name} = {module}:main" for name, module in NODES.items()),
         ]
     },

@@ -9,10 +9,10 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from ahv_analysis.case import NODES
-from ahv_analysis.recorder_node import RECORDER_PARAMETERS
-from ahv_msgs_py.base_node import SHELL_PARAMETERS
-from ahv_msgs_py.faults import fault_rows
+from ahv_analysis.bag.recorder_node import RECORDER_PARAMETERS
+from ahv_analysis.flight.case import NODES
+from ahv_msgs_py.node.base_node import SHELL_PARAMETERS
+from ahv_msgs_py.node.faults import fault_rows
 from ahv_msgs_py.parameters import Parameter, Value
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,

@@ -4,7 +4,7 @@
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-from ahv_plant.compiled import source_hash
+from ahv_plant.numerics.elementwise import source_hash
 
 # Distributions of each package: rclpy has one name on PyPI and another in a ROS installation.
 DISTRIBUTIONS = {

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
 from ahv_control.intermediate_loop import Rates
-from ahv_plant.compiled import elementwise, select
-from ahv_plant.constants import DEGREES, RADIANS, STEP
+from ahv_plant.model.constants import DEGREES, RADIANS, STEP
+from ahv_plant.numerics.elementwise import elementwise, select
 
 
 class LearnerSettings(NamedTuple):

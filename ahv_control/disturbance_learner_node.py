@@ -9,11 +9,11 @@ from ahv_control.held_inputs import held_rates, held_surfaces, nothing
 from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.parameters import LEARNER_PARAMETERS, learner_settings
-from ahv_msgs_py.base_node import BaseNode
-from ahv_msgs_py.faults import Fault
-from ahv_msgs_py.node_process import run
+from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.process import run
+from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,
@@ -21,9 +21,9 @@ from ahv_msgs_py.topics import (
     STATE,
     SURFACE_COMMAND,
 )
-from ahv_plant.constants import DEGREES, STEP_NS
+from ahv_plant.model.constants import DEGREES, STEP_NS
+from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.parameters import DEFAULT_START
-from ahv_plant.state import State, Surfaces
 
 
 class DisturbanceLearnerNode(BaseNode):

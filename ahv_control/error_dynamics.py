@@ -15,8 +15,8 @@ everywhere.
 from typing import NamedTuple
 
 from ahv_control.intermediate_loop import Rates
-from ahv_plant.compiled import elementwise, select
-from ahv_plant.elementary import power
+from ahv_plant.numerics.elementary import power
+from ahv_plant.numerics.elementwise import elementwise, select
 
 FLOOR = 0.1  # [-] least value of 1 - e^2 / k_s^2 that the gain follows
 

@@ -15,8 +15,8 @@ from ahv_control.intermediate_loop import IntermediateLoop, Rates, rate_command
 from ahv_control.newton_raphson import nominal_response
 from ahv_control.outer_loop import Attitude, OuterLoop, attitude_command
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
-from ahv_plant.compiled import elementwise
-from ahv_plant.state import State, Surfaces
+from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.numerics.elementwise import elementwise
 
 # The search for the first command starts here; later ones start at the command before.
 NEUTRAL = Surfaces(0.0, 0.0, 0.0)

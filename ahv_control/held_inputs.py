@@ -5,10 +5,10 @@ Each takes the last values, None if there were none, and their age in steps.
 """
 
 from ahv_control.flight_control import NEUTRAL
-from ahv_msgs_py.faults import HOLD, PERIOD
-from ahv_msgs_py.stepwise import Values
+from ahv_msgs_py.node.faults import HOLD, PERIOD
+from ahv_msgs_py.node.synchronizer import Values
+from ahv_plant.model.vectors import Surfaces
 from ahv_plant.safe_command import safe_surfaces
-from ahv_plant.state import Surfaces
 
 
 def held_rates(last: Values | None, age: int) -> Values:

@@ -10,19 +10,19 @@ from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import learned_of, unlearned
 from ahv_control.newton_raphson import Solution, SolverStatus
 from ahv_control.parameters import INNER_LOOP_PARAMETERS, inner_loop
-from ahv_msgs_py.base_node import BaseNode
-from ahv_msgs_py.faults import Fault
-from ahv_msgs_py.node_process import run
+from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.process import run
+from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,
     RATE_COMMAND,
     SURFACE_COMMAND,
 )
+from ahv_plant.model.vectors import State
 from ahv_plant.parameters import DEFAULT_START
-from ahv_plant.state import State
 
 FAULTS = {
     SolverStatus.SATURATED: Fault.SURFACES_SATURATED,

@@ -4,9 +4,9 @@
 from typing import NamedTuple
 
 from ahv_control.outer_loop import Attitude
-from ahv_plant.compiled import elementwise
-from ahv_plant.elementary import sin_cos
-from ahv_plant.state import State
+from ahv_plant.model.vectors import State
+from ahv_plant.numerics.elementary import sin_cos
+from ahv_plant.numerics.elementwise import elementwise
 
 
 class IntermediateLoop(NamedTuple):

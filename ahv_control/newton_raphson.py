@@ -8,7 +8,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from ahv_control.intermediate_loop import Rates
-from ahv_plant.aerodynamics import (
+from ahv_plant.model.aerodynamics import (
     AirData,
     Coefficients,
     add_coefficients,
@@ -17,10 +17,10 @@ from ahv_plant.aerodynamics import (
     control_coefficients,
     loads,
 )
-from ahv_plant.compiled import elementwise, select
-from ahv_plant.mass_properties import Inertia, centre_of_gravity, inertia
-from ahv_plant.rigid_body import angular_acceleration
-from ahv_plant.state import State, Surfaces, limit_surfaces
+from ahv_plant.model.mass import Inertia, centre_of_gravity, inertia
+from ahv_plant.model.rigid_body import angular_acceleration
+from ahv_plant.model.vectors import State, Surfaces, limit_surfaces
+from ahv_plant.numerics.elementwise import elementwise, select
 
 # A determinant below this means that the surfaces have lost the vehicle.
 SINGULAR_DETERMINANT = 1e-9  # [1/s^6]

@@ -10,13 +10,13 @@ from ahv_control.parameters import (
     intermediate_loop,
     outer_loop,
 )
-from ahv_msgs_py.base_node import BaseNode
-from ahv_msgs_py.node_process import run
+from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.process import run
+from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND
+from ahv_plant.model.vectors import State
 from ahv_plant.parameters import DEFAULT_START
-from ahv_plant.state import State
 
 
 class OuterIntermediateNode(BaseNode):

@@ -4,9 +4,9 @@
 from math import sqrt
 from typing import NamedTuple
 
-from ahv_plant.compiled import elementwise
-from ahv_plant.elementary import asin, atan_ratio, sin_cos
-from ahv_plant.state import State, clamp
+from ahv_plant.model.vectors import State, clamp
+from ahv_plant.numerics.elementary import asin, atan_ratio, sin_cos
+from ahv_plant.numerics.elementwise import elementwise
 
 
 class OuterLoop(NamedTuple):

@@ -3,12 +3,12 @@
 
 from typing import NamedTuple
 
-from ahv_plant.aerodynamics import aerodynamic_coefficients, air_data, loads
-from ahv_plant.compiled import elementwise
-from ahv_plant.constants import GRAVITY, MAXIMUM_THRUST
-from ahv_plant.elementary import sin_cos
-from ahv_plant.mass_properties import centre_of_gravity
-from ahv_plant.state import State, Surfaces, limit_throttle
+from ahv_plant.model.aerodynamics import aerodynamic_coefficients, air_data, loads
+from ahv_plant.model.constants import GRAVITY, MAXIMUM_THRUST
+from ahv_plant.model.mass import centre_of_gravity
+from ahv_plant.model.vectors import State, Surfaces, limit_throttle
+from ahv_plant.numerics.elementary import sin_cos
+from ahv_plant.numerics.elementwise import elementwise
 
 
 class VelocityLoop(NamedTuple):

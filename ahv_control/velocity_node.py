@@ -7,15 +7,15 @@ from ahv_control.flight_control import NEUTRAL
 from ahv_control.held_inputs import held_surfaces
 from ahv_control.parameters import VELOCITY_PARAMETERS, velocity_loop
 from ahv_control.velocity_loop import throttle_command
-from ahv_msgs_py.base_node import BaseNode
-from ahv_msgs_py.faults import Fault
-from ahv_msgs_py.node_process import run
+from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.process import run
+from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Values
 from ahv_msgs_py.topics import SURFACE_COMMAND, THROTTLE_COMMAND
-from ahv_plant.constants import THROTTLE_MAXIMUM, THROTTLE_MINIMUM
+from ahv_plant.model.constants import THROTTLE_MAXIMUM, THROTTLE_MINIMUM
+from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.parameters import DEFAULT_START
-from ahv_plant.state import State, Surfaces
 
 
 class VelocityNode(BaseNode):

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ahv_plant.aerodynamics import Coefficients
-from ahv_plant.compiled import elementwise, select
-from ahv_plant.elementary import sin_cos
-from ahv_plant.mass_properties import Inertia
+from ahv_plant.model.aerodynamics import Coefficients
+from ahv_plant.model.mass import Inertia
+from ahv_plant.numerics.elementary import sin_cos
+from ahv_plant.numerics.elementwise import elementwise, select
 
 
 class Dispersion(NamedTuple):

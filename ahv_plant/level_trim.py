@@ -3,17 +3,17 @@
 
 from typing import NamedTuple
 
-from ahv_plant.compiled import elementwise, select
-from ahv_plant.constants import (
+from ahv_plant.dispersion import Truth
+from ahv_plant.model.constants import (
     MAXIMUM_THRUST,
     SURFACE_MAXIMUM,
     SURFACE_MINIMUM,
     THROTTLE_MAXIMUM,
     THROTTLE_MINIMUM,
 )
-from ahv_plant.dispersion import Truth
-from ahv_plant.elementary import sin_cos
-from ahv_plant.state import State, Surfaces
+from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.numerics.elementary import sin_cos
+from ahv_plant.numerics.elementwise import elementwise, select
 from ahv_plant.vehicle import state_rate
 
 DIFFERENCE = 1e-6  # [rad] of the finite-difference Jacobian

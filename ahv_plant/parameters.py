@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
-from ahv_plant.constants import DEGREES, INITIAL_MASS, RADIANS, STEP
 from ahv_plant.dispersion import AxisDisturbance, Dispersion, Disturbance, Truth
-from ahv_plant.mass_properties import MASS_MAXIMUM, MASS_MINIMUM
-from ahv_plant.state import State
+from ahv_plant.model.constants import DEGREES, INITIAL_MASS, RADIANS, STEP
+from ahv_plant.model.mass import MASS_MAXIMUM, MASS_MINIMUM
+from ahv_plant.model.vectors import State
 from ahv_plant.trim import check_flight_condition
 
 GEOMETRIC_ALTITUDE = Parameter(

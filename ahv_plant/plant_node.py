@@ -13,13 +13,13 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from visualization_msgs.msg import Marker
 
-from ahv_msgs_py.base_node import BaseNode, message_class, quality
-from ahv_msgs_py.faults import HOLD, Fault
-from ahv_msgs_py.health import ERROR, MILLISECONDS, OK, percentile
 from ahv_msgs_py.layout import NANOSECONDS, clock_bytes
-from ahv_msgs_py.node_process import run
+from ahv_msgs_py.node.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.node.faults import HOLD, Fault
+from ahv_msgs_py.node.health import ERROR, MILLISECONDS, OK, percentile
+from ahv_msgs_py.node.process import run
+from ahv_msgs_py.node.synchronizer import Stepwise, Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.stepwise import Stepwise, Values
 from ahv_msgs_py.topics import (
     BODY_FRAME,
     CLOCK,
@@ -34,11 +34,11 @@ from ahv_msgs_py.topics import (
     TRANSFORM,
     LoopTopic,
 )
-from ahv_plant.constants import STEP, STEP_NS
-from ahv_plant.departure import departure_reason
+from ahv_plant.model.constants import STEP, STEP_NS
+from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
 from ahv_plant.safe_command import SAFE_THROTTLE, safe_surfaces
-from ahv_plant.state import State, Surfaces
+from ahv_plant.termination import departure_reason
 from ahv_plant.vehicle import vehicle_step
 from ahv_plant.viewer_pose import (
     FLU_IN_FRD,

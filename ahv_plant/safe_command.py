@@ -1,7 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """What the vehicle does when commands stay away: the stated safe command."""
 
-from ahv_plant.state import Surfaces
+from ahv_plant.model.vectors import Surfaces
 
 SAFE_THROTTLE = 0.194  # [-] section 3.5.1: level flight, until the first command comes
 

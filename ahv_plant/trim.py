@@ -7,17 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import root
 
-from ahv_plant.aerodynamics import MACH_MINIMUM
-from ahv_plant.atmosphere import (
+from ahv_plant.dispersion import NOMINAL, Truth
+from ahv_plant.model.aerodynamics import MACH_MINIMUM
+from ahv_plant.model.atmosphere import (
     ALTITUDE_MAXIMUM,
     ALTITUDE_MINIMUM,
     atmosphere,
     geopotential_altitude,
 )
-from ahv_plant.constants import INITIAL_MASS
-from ahv_plant.dispersion import NOMINAL, Truth
-from ahv_plant.mass_properties import MASS_MAXIMUM, MASS_MINIMUM
-from ahv_plant.state import State, Surfaces, limit_surfaces, limit_throttle
+from ahv_plant.model.constants import INITIAL_MASS
+from ahv_plant.model.mass import MASS_MAXIMUM, MASS_MINIMUM
+from ahv_plant.model.vectors import State, Surfaces, limit_surfaces, limit_throttle
 from ahv_plant.vehicle import state_rate
 
 CRUISE_ALTITUDE = 24_000.0  # [m] h*, section 3.5.1

@@ -1,18 +1,18 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The vehicle: eqs 2.1-2.14 under held controls, and one Runge-Kutta step of them."""
 
-from ahv_plant.aerodynamics import Loads, aerodynamic_coefficients, air_data, loads
-from ahv_plant.compiled import elementwise
-from ahv_plant.constants import GRAVITY, MAXIMUM_THRUST, SPECIFIC_IMPULSE, STEP
 from ahv_plant.dispersion import (
     Truth,
     disperse_coefficients,
     disperse_inertia,
     disturbance_acceleration,
 )
-from ahv_plant.mass_properties import centre_of_gravity, inertia
-from ahv_plant.rigid_body import motion
-from ahv_plant.state import State, Surfaces, limit_surfaces, limit_throttle
+from ahv_plant.model.aerodynamics import Loads, aerodynamic_coefficients, air_data, loads
+from ahv_plant.model.constants import GRAVITY, MAXIMUM_THRUST, SPECIFIC_IMPULSE, STEP
+from ahv_plant.model.mass import centre_of_gravity, inertia
+from ahv_plant.model.rigid_body import motion
+from ahv_plant.model.vectors import State, Surfaces, limit_surfaces, limit_throttle
+from ahv_plant.numerics.elementwise import elementwise
 
 
 @elementwise

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from scipy.spatial.transform import Rotation
 
-from ahv_plant.state import State
+from ahv_plant.model.vectors import State
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w

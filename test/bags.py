@@ -8,8 +8,8 @@ import yaml
 from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from ahv_analysis.bag_reader import load_bag
-from ahv_analysis.bag_writer import BagWriter
+from ahv_analysis.bag.reader import load_bag
+from ahv_analysis.bag.writer import BagWriter
 from ahv_msgs_py.topics import CLOCK, STATE
 
 QOS = """\

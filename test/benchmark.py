@@ -16,18 +16,18 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.block import fly_alone, fly_block
-from ahv_analysis.campaign import Campaign, fly_campaign, fly_runs
-from ahv_analysis.case import load_case
-from ahv_analysis.dataset import bag_dataset
-from ahv_analysis.flight import fly, fly_library
-from ahv_analysis.graph_flight import fly_graph
-from ahv_analysis.process_flight import fly_processes
-from ahv_analysis.table import REPORT
-from ahv_plant.compiled import kernel
-from ahv_plant.constants import STEP
-from ahv_plant.lanes import FLOATS, LANES, load, store
+from ahv_analysis.bag.dataset import bag_dataset
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.campaign.batch import fly_alone, fly_block
+from ahv_analysis.campaign.campaign import Campaign, fly_campaign, fly_runs
+from ahv_analysis.campaign.table import REPORT
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly, fly_library
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_analysis.flight.process_per_node import fly_processes
+from ahv_plant.model.constants import STEP
+from ahv_plant.numerics.elementwise import kernel
+from ahv_plant.numerics.simd import FLOATS, LANES, load, store
 
 ROUNDS = 5
 TRIALS = 2048
@@ -35,7 +35,7 @@ TRIALS = 2048
 # Counts the additions, multiplications and divisions of one step of one run, in plain Python.
 COUNT = """
 import json
-from ahv_analysis.case import load_case
+from ahv_analysis.flight.case import load_case
 from ahv_control.flight_control import NEUTRAL, adaptive_control, first_learner, next_learner
 from ahv_plant.vehicle import vehicle_step
 
@@ -87,9 +87,9 @@ from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from tempfile import TemporaryDirectory
 
-from ahv_analysis.campaign import Campaign, fly_campaign, fly_runs
-from ahv_analysis.campaign_summary import summarize_campaign
-from ahv_analysis.case import load_case
+from ahv_analysis.campaign.campaign import Campaign, fly_campaign, fly_runs
+from ahv_analysis.campaign.summary import summarize_campaign
+from ahv_analysis.flight.case import load_case
 
 case = load_case("neuro_adaptive_sc_gdi", {"duration": 1.0})
 campaign = Campaign(case, 0.3, int(sys.argv[1]), 1)

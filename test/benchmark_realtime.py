@@ -9,10 +9,15 @@ import tempfile
 import time
 from pathlib import Path
 
-from ahv_analysis.bag_reader import load_bag
-from ahv_analysis.case import load_case
-from ahv_analysis.graph_flight import fly_graph
-from ahv_analysis.process_flight import LONGEST_START, ProcessGraph, Watcher, set_transport
+from ahv_analysis.bag.reader import load_bag
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_analysis.flight.process_per_node import (
+    LONGEST_START,
+    ProcessGraph,
+    Watcher,
+    set_transport,
+)
 from ahv_msgs_py.topics import STATE
 from test.witness import STILL, Stop, machine_watched, stood_still
 

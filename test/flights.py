@@ -3,8 +3,8 @@
 
 from hypothesis import strategies as st
 
-from ahv_plant.constants import RADIANS
-from ahv_plant.state import State, Surfaces
+from ahv_plant.model.constants import RADIANS
+from ahv_plant.model.vectors import State, Surfaces
 
 CRUISE = State(
     1786.4, 0.0, 91.8, 0.0, 0.0, 0.0, 0.0, 2.94 * RADIANS, 0.0, 0.0, 0.0, 24000.0, 136077.6

@@ -28,13 +28,13 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from rclpy.duration import Duration
 
-from ahv_analysis import graph_flight
-from ahv_analysis.bag_recovery import recover
-from ahv_analysis.case import load_case
-from ahv_analysis.graph_flight import fly_graph
+from ahv_analysis.bag.recovery import recover
+from ahv_analysis.flight import one_process
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.topics import NOMINAL_TOPICS
 from ahv_plant import plant_node
-from ahv_plant.constants import STEP_NS
+from ahv_plant.model.constants import STEP_NS
 from ahv_plant.plant_node import PlantNode
 
 BOUND = 0.2  # [s] of wall time that a killed recorder may lose
@@ -108,7 +108,7 @@ def kill_recorders(folder: Path, moments: Sequence[float], domain: int) -> list[
     try:
         with (
             suppress(_Enough),
-            patch.object(graph_flight, "PlantNode", Plant),
+            patch.object(one_process, "PlantNode", Plant),
             patch.object(plant_node, "LONGEST_WAIT", Duration()),  # the dead acknowledge nothing
         ):
             fly_graph(load_case("nominal_di"), None, domain=domain, progress=progress)

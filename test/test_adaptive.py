@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahv_analysis.case import dispersion_parameters, load_case
-from ahv_analysis.flight import fly
-from ahv_analysis.record import record
+from ahv_analysis.bag.record import record
+from ahv_analysis.flight.case import dispersion_parameters, load_case
+from ahv_analysis.flight.library import fly
 from ahv_control.error_dynamics import ErrorDynamics, decay, error_decay
 from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_demand
 from ahv_control.intermediate_loop import Rates
 from ahv_control.newton_raphson import nominal_response
 from ahv_control.outer_loop import OuterLoop, attitude_command
-from ahv_plant.constants import DEGREES, RADIANS
 from ahv_plant.dispersion import Dispersion, draw_dispersion
-from ahv_plant.elementary import atan
-from ahv_plant.state import Surfaces
+from ahv_plant.model.constants import DEGREES, RADIANS
+from ahv_plant.model.vectors import Surfaces
+from ahv_plant.numerics.elementary import atan
 from test.flights import CRUISE, STATES, between
 
 RATES = st.builds(Rates, *[between(-0.3, 0.3)] * 3)

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 
-from ahv_plant import aerodynamic_fits
-from ahv_plant.aerodynamics import aerodynamic_coefficients, air_data, control_coefficients
-from ahv_plant.constants import DEGREES, MEAN_CHORD, WING_SPAN
-from ahv_plant.state import Surfaces
+from ahv_plant.model import aerodynamic_fits
+from ahv_plant.model.aerodynamics import aerodynamic_coefficients, air_data, control_coefficients
+from ahv_plant.model.constants import DEGREES, MEAN_CHORD, WING_SPAN
+from ahv_plant.model.vectors import Surfaces
 from test.flights import STATES, SURFACES, as_python, between
 
 pytestmark = pytest.mark.unit

@@ -4,7 +4,7 @@
 import pytest
 from hypothesis import given
 
-from ahv_plant.atmosphere import (
+from ahv_plant.model.atmosphere import (
     STANDARD_GRAVITY,
     atmosphere,
     geopotential_altitude,

@@ -12,12 +12,12 @@ from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from ahv_analysis.bag_reader import load_bag, read_bag, read_notes
-from ahv_analysis.bag_writer import BagWriter
-from ahv_analysis.case import load_case
+from ahv_analysis.bag.reader import load_bag, read_bag, read_notes
+from ahv_analysis.bag.record import record
+from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
-from ahv_analysis.flight import fly, fly_library
-from ahv_analysis.record import record
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly, fly_library
 from ahv_msgs_py.topics import CLOCK, LOOP_TOPICS, NOMINAL_TOPICS, STATE
 from test.bags import DAMAGES, mcap_of, stock
 from test.test_messages import message_of
@@ -134,7 +134,7 @@ def test_a_message_that_is_none_is_named(tmp_path, data):
 
 def test_without_ros_a_message_of_another_sender_is_named(tmp_path, monkeypatch):
     path = two_states(tmp_path / "bag", 0.0)
-    monkeypatch.setattr("ahv_analysis.bag_reader.STATE.layout.decode_all", no_message_fits)
+    monkeypatch.setattr("ahv_analysis.bag.reader.STATE.layout.decode_all", no_message_fits)
     monkeypatch.setitem(sys.modules, "rclpy", None)
     with pytest.raises(BagError, match="which only ROS can read"):
         read_bag(path)

@@ -6,10 +6,10 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from ahv_analysis.bag_writer import BagWriter
-from ahv_analysis.case import load_case
-from ahv_analysis.command import app
-from ahv_analysis.flight import fly_library
+from ahv_analysis.bag.writer import BagWriter
+from ahv_analysis.command.main import app
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly_library
 from test.bags import DAMAGES, cut_in_flight, one_bit_flipped, without_a_topic, without_metadata
 
 

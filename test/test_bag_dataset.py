@@ -11,9 +11,7 @@ import pyarrow.parquet
 import pytest
 import xarray
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.case import load_case
-from ahv_analysis.dataset import (
+from ahv_analysis.bag.dataset import (
     AIR_SIGNALS,
     ATTITUDE_SIGNALS,
     ESTIMATE_SIGNALS,
@@ -25,10 +23,12 @@ from ahv_analysis.dataset import (
     THROTTLE_SIGNALS,
     bag_dataset,
 )
-from ahv_analysis.flight import fly_library
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly_library
 from ahv_msgs_py.topics import BASIS_NAMES, LEARNER_NAMES, LOOP_TOPICS
-from ahv_plant.aerodynamics import air_data
-from ahv_plant.state import State
+from ahv_plant.model.aerodynamics import air_data
+from ahv_plant.model.vectors import State
 
 RECORDED = (
     *STATE_SIGNALS,

@@ -16,17 +16,17 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from rclpy.experimental import EventsExecutor
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.bag_recovery import recover
-from ahv_analysis.bag_writer import BagWriter
-from ahv_analysis.case import load_case
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.record import record
+from ahv_analysis.bag.recorder_node import CONTINUE, RecorderNode
+from ahv_analysis.bag.recovery import recover
+from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
-from ahv_analysis.flight import fly, fly_library
-from ahv_analysis.graph_flight import fly_graph
-from ahv_analysis.record import record
-from ahv_analysis.recorder_node import CONTINUE, RecorderNode
-from ahv_msgs_py.base_node import quality
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly, fly_library
+from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.layout import clock_bytes
+from ahv_msgs_py.node.base_node import quality
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, STATE
 from test.bags import mcap_of

@@ -8,13 +8,13 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from rosbags.rosbag2 import Reader
 
-from ahv_analysis.bag_info import bag_info
-from ahv_analysis.bag_reader import load_bag, read_bag, read_notes
-from ahv_analysis.bag_recovery import recover
-from ahv_analysis.bag_writer import BagWriter
-from ahv_analysis.case import load_case, notes
+from ahv_analysis.bag.info import bag_info
+from ahv_analysis.bag.reader import load_bag, read_bag, read_notes
+from ahv_analysis.bag.recovery import recover
+from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
-from ahv_analysis.flight import fly, write_step
+from ahv_analysis.flight.case import load_case, notes
+from ahv_analysis.flight.library import fly, write_step
 from test.bags import (
     cut_in_flight,
     cut_short,
@@ -37,7 +37,7 @@ def whole(tmp_path_factory):
     path = tmp_path_factory.mktemp("whole") / "bag"
     case = load_case("nominal_di", {"duration": STEPS / 100})
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ahv_analysis.bag_writer.LONGEST", STEPS // 10)
+        patch.setattr("ahv_analysis.bag.writer.LONGEST", STEPS // 10)
         bag = BagWriter(path, notes(case))
         for step in fly(case):
             write_step(bag, step)

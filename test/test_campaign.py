@@ -19,20 +19,20 @@ import pytest
 from matplotlib import pyplot
 from scipy.stats import beta
 
-from ahv_analysis.block import fly_alone
-from ahv_analysis.campaign import (
+from ahv_analysis.campaign.batch import fly_alone
+from ahv_analysis.campaign.campaign import (
     Campaign,
     first_causes,
     fly_campaign,
     open_campaign,
 )
-from ahv_analysis.campaign_store import PART_RUNS, level_folder, part_files
-from ahv_analysis.campaign_summary import exact_interval, summarize_campaign
-from ahv_analysis.case import config_folder, load_case
+from ahv_analysis.campaign.store import PART_RUNS, level_folder, part_files
+from ahv_analysis.campaign.summary import exact_interval, summarize_campaign
+from ahv_analysis.campaign.table import CONTROLLERS, REPORT, fly_table, markdown
 from ahv_analysis.errors import CampaignError
-from ahv_analysis.report_figures import campaign_figures
-from ahv_analysis.table import CONTROLLERS, REPORT, fly_table, markdown
-from ahv_analysis.tally import Cause
+from ahv_analysis.flight.case import config_folder, load_case
+from ahv_analysis.flight.outcome import Cause
+from ahv_analysis.report.page_figures import campaign_figures
 from test.test_command import ahv
 
 RUNS = 150
@@ -403,7 +403,7 @@ def test_a_run_can_be_flown_on_the_graph(tmp_path):
     assert result.returncode == 0, result.stderr
     found = json.loads(result.stdout)
     assert found["same_bits"] is True and found["ended_early"] == ""
-    from ahv_analysis.bag_reader import read_bag
+    from ahv_analysis.bag.reader import read_bag
 
     flight = read_bag(Path(found["bag"]))
     assert flight.steps == 15000

@@ -5,10 +5,10 @@ import math
 
 import pytest
 
-from ahv_analysis.case import case_names, config_folder, load_case
+from ahv_analysis.flight.case import case_names, config_folder, load_case
 from ahv_msgs_py.parameters import ParameterError
-from ahv_plant.constants import RADIANS
 from ahv_plant.dispersion import NOMINAL
+from ahv_plant.model.constants import RADIANS
 
 pytestmark = pytest.mark.unit
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from ahv_plant.state import State
+from ahv_plant.model.vectors import State
 
 
 def ahv(*arguments, domain=100, cwd=None):
@@ -152,7 +152,7 @@ def test_the_library_engine_needs_no_ros(tmp_path):
     """The whole way of a flight and its figures without rclpy to import."""
     program = (
         "import sys; sys.modules['rclpy'] = None\n"
-        "from ahv_analysis.command import app\n"
+        "from ahv_analysis.command.main import app\n"
         f"out = {str(tmp_path)!r}\n"
         "fly = ['fly', 'neuro_adaptive_di', '--engine', 'library', '--duration', '0.5']\n"
         "app([*fly, '--out', out], standalone_mode=False)\n"

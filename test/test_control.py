@@ -19,16 +19,16 @@ from ahv_control.newton_raphson import (
 )
 from ahv_control.outer_loop import Attitude, OuterLoop, attitude_command
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
-from ahv_plant.constants import (
+from ahv_plant.dispersion import NOMINAL
+from ahv_plant.model.constants import (
     DEGREES,
     SURFACE_MAXIMUM,
     SURFACE_MINIMUM,
     THROTTLE_MAXIMUM,
     THROTTLE_MINIMUM,
 )
-from ahv_plant.dispersion import NOMINAL
+from ahv_plant.model.vectors import Surfaces
 from ahv_plant.safe_command import safe_surfaces
-from ahv_plant.state import Surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import CRUISE, STATES, SURFACES, between, degrees
 

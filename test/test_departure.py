@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from ahv_plant.departure import departure_reason
+from ahv_plant.termination import departure_reason
 from test.flights import CRUISE
 
 pytestmark = pytest.mark.unit

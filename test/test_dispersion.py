@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ahv_control
-from ahv_analysis.case import load_case, load_dispersion
+from ahv_analysis.flight.case import load_case, load_dispersion
 from ahv_control.parameters import (
     INNER_LOOP_PARAMETERS,
     LEARNER_PARAMETERS,
@@ -19,8 +19,6 @@ from ahv_control.parameters import (
     VELOCITY_PARAMETERS,
 )
 from ahv_msgs_py.parameters import ParameterError
-from ahv_plant.aerodynamics import aerodynamic_coefficients, air_data, loads
-from ahv_plant.constants import GRAVITY
 from ahv_plant.dispersion import (
     NOMINAL,
     AxisDisturbance,
@@ -32,8 +30,10 @@ from ahv_plant.dispersion import (
     disturbance_acceleration,
     draw_dispersion,
 )
-from ahv_plant.mass_properties import Inertia, centre_of_gravity, inertia
-from ahv_plant.state import Surfaces
+from ahv_plant.model.aerodynamics import aerodynamic_coefficients, air_data, loads
+from ahv_plant.model.constants import GRAVITY
+from ahv_plant.model.mass import Inertia, centre_of_gravity, inertia
+from ahv_plant.model.vectors import Surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import STATES, SURFACES, between
 
@@ -45,7 +45,7 @@ MULTIPLIERS = st.builds(Dispersion, *[between(0.5, 1.5)] * 9)
 
 def test_no_module_of_the_flight_control_can_see_a_dispersion():
     """Only what is imported can be seen: neither the dispersion nor the vehicle that has it."""
-    for path in Path(ahv_control.__file__).parent.glob("*.py"):
+    for path in Path(ahv_control.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             modules = []
             if isinstance(node, ast.ImportFrom):

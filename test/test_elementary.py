@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ahv_plant.elementary import asin, atan, exp_small, log_near_one, power, sin_cos
+from ahv_plant.numerics.elementary import asin, atan, exp_small, log_near_one, power, sin_cos
 from test.flights import between
 
 pytestmark = pytest.mark.unit

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from catkin_pkg.package import parse_package
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.case import load_case
-from ahv_analysis.flight import fly
-from ahv_analysis.record import record
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.record import record
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly
 from test.documents import ROOT, run_in_terminals
 
 EXAMPLES = ROOT / "examples"

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from matplotlib import pyplot
 
-from ahv_analysis.case import load_case
-from ahv_analysis.figures import CHAPTER_3, FLOWN, TUMBLING, draw
-from ahv_analysis.flight import fly
-from ahv_analysis.record import record
+from ahv_analysis.bag.record import record
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly
+from ahv_analysis.report.figures import CHAPTER_3, FLOWN, TUMBLING, draw
 
 pytestmark = pytest.mark.unit
 

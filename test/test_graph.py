@@ -11,15 +11,15 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.case import case_names, load_case
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.record import record
 from ahv_analysis.errors import BagError, GraphError
-from ahv_analysis.flight import fly, fly_library
-from ahv_analysis.graph_flight import fly_graph
-from ahv_analysis.record import record
+from ahv_analysis.flight.case import case_names, load_case
+from ahv_analysis.flight.library import fly, fly_library
+from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, LOOP_TOPICS, NOMINAL_TOPICS, ODOMETRY, STATE
-from ahv_plant.state import State
+from ahv_plant.model.vectors import State
 
 STEPS = 15000
 ARRAYS = ("stamps", "states", "attitude_commands", "rate_commands", "surfaces", "throttle")
@@ -203,7 +203,7 @@ def test_a_bag_is_never_overwritten(tmp_path, domain):
 
 
 def test_a_silent_graph_is_reported(domain, monkeypatch):
-    monkeypatch.setattr("ahv_analysis.graph_flight.LONGEST_SILENCE", 0.5)
+    monkeypatch.setattr("ahv_analysis.flight.one_process.LONGEST_SILENCE", 0.5)
     monkeypatch.setattr("ahv_control.velocity_node.VelocityNode._answer", lambda *arguments: None)
     with pytest.raises(GraphError, match="stopped at step 0"):
         fly_graph(load_case("nominal_di", {"duration": 0.1}), None, domain=domain)

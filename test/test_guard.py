@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahv_msgs_py.faults import HOLD, PERIOD, SILENCE, STALE, Fault, fault_rows
-from ahv_msgs_py.guard import Guard, Refusal
 from ahv_msgs_py.layout import MessageError, NamedVector
-from ahv_msgs_py.stepwise import RealTimeSteps
+from ahv_msgs_py.node.faults import HOLD, PERIOD, SILENCE, STALE, Fault, fault_rows
+from ahv_msgs_py.node.guard import Guard, Refusal
+from ahv_msgs_py.node.synchronizer import RealTimeSteps
 from ahv_msgs_py.topics import SURFACE_COMMAND
 
 pytestmark = pytest.mark.unit

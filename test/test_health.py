@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahv_msgs_py.faults import Fault
-from ahv_msgs_py.health import ERROR, OK, WARN, Health, percentile
+from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.health import ERROR, OK, WARN, Health, percentile
 
 pytestmark = pytest.mark.unit
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from numba.core import config
 from numba.core.errors import TypingError
 
-from ahv_plant import compiled
-from ahv_plant.compiled import elementwise, kernel, select
-from ahv_plant.lanes import LANES, load, store, widen
-from ahv_plant.state import Surfaces
+from ahv_plant.model.vectors import Surfaces
+from ahv_plant.numerics import elementwise as compiled
+from ahv_plant.numerics.elementwise import elementwise, kernel, select
+from ahv_plant.numerics.simd import LANES, load, store, widen
 
 pytestmark = pytest.mark.unit
 

@@ -10,29 +10,29 @@ import sys
 import numpy as np
 import pytest
 
-from ahv_analysis.block import (
+from ahv_analysis.bag.record import record
+from ahv_analysis.campaign.batch import (
     LIKE,
     fly_alone,
     fly_block,
     fly_trajectory,
 )
-from ahv_analysis.campaign import Campaign
-from ahv_analysis.case import load_case
-from ahv_analysis.flight import fly
-from ahv_analysis.record import record
-from ahv_analysis.tally import Cause, Tally
+from ahv_analysis.campaign.campaign import Campaign
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly
+from ahv_analysis.flight.outcome import Cause, Tally
 from ahv_control.flight_control import (
     NEUTRAL,
     adaptive_control,
     first_learner,
     next_learner,
 )
-from ahv_plant.compiled import kernel
-from ahv_plant.constants import STEP
 from ahv_plant.dispersion import Truth, draw_dispersion
-from ahv_plant.lanes import LANES, load, store, widen
 from ahv_plant.level_trim import LevelTrim, level_trim
-from ahv_plant.state import State
+from ahv_plant.model.constants import STEP
+from ahv_plant.model.vectors import State
+from ahv_plant.numerics.elementwise import kernel
+from ahv_plant.numerics.simd import LANES, load, store, widen
 from ahv_plant.trim import trim
 from ahv_plant.vehicle import vehicle_step
 
@@ -105,8 +105,8 @@ def test_a_lane_has_the_bits_of_the_scalar_run(case, ends):
 
 
 PLAIN = """
-from ahv_analysis.case import dispersion_parameters, load_case
-from ahv_analysis.flight import fly
+from ahv_analysis.flight.case import dispersion_parameters, load_case
+from ahv_analysis.flight.library import fly
 from ahv_plant.dispersion import draw_dispersion
 
 plant = dispersion_parameters(draw_dispersion(0.4, {seed}, {run}))
@@ -132,10 +132,10 @@ def test_a_lane_has_the_bits_of_plain_python_floats(ends):
 
 ASSEMBLY = """
 import numpy as np
-from ahv_analysis.block import LIKE, adaptive_block
-from ahv_analysis.case import load_case
-from ahv_analysis.tally import Tally
-from ahv_plant.lanes import LANES
+from ahv_analysis.campaign.batch import LIKE, adaptive_block
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.outcome import Tally
+from ahv_plant.numerics.simd import LANES
 
 case = load_case("neuro_adaptive_sc_gdi")
 states = np.repeat(np.array(case.plant.initial)[:, None], LANES, axis=1)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahv_analysis.case import load_case
-from ahv_analysis.flight import fly
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly
 from ahv_control.disturbance_learner import (
     Basis,
     LearnerSettings,
@@ -26,9 +26,9 @@ from ahv_control.disturbance_learner import (
 from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.flight_control import adaptive_control, next_learner
 from ahv_control.intermediate_loop import Rates
-from ahv_plant.constants import DEGREES, RADIANS, STEP
 from ahv_plant.dispersion import NOMINAL, disturbance_acceleration
-from ahv_plant.state import Surfaces
+from ahv_plant.model.constants import DEGREES, RADIANS, STEP
+from ahv_plant.model.vectors import Surfaces
 from ahv_plant.vehicle import vehicle_step
 from test.flights import CRUISE, as_python, between
 

@@ -12,8 +12,8 @@ from mcap.records import Channel, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from ahv_analysis.mcap_file import McapFile
-from ahv_analysis.mcap_scan import HEAD, Block, Damage, scan
+from ahv_analysis.bag.mcap_file import McapFile
+from ahv_analysis.bag.mcap_scan import HEAD, Block, Damage, scan
 
 pytestmark = pytest.mark.unit
 

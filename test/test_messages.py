@@ -12,8 +12,8 @@ from rosbags.typesys import Stores, get_typestore
 from ahv_control.disturbance_learner import Basis, start_learner
 from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learned_of, learner_values, unlearned
-from ahv_msgs_py.base_node import message_class
 from ahv_msgs_py.layout import MessageError, clock_bytes
+from ahv_msgs_py.node.base_node import message_class
 from ahv_msgs_py.topics import (
     BASIS_NAMES,
     LEARNER_NAMES,
@@ -23,7 +23,7 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
     SURFACE_NAMES,
 )
-from ahv_plant.state import State, Surfaces
+from ahv_plant.model.vectors import State, Surfaces
 
 pytestmark = pytest.mark.unit
 

@@ -14,9 +14,9 @@ from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.experimental import EventsExecutor
 
-from ahv_analysis.case import load_case
-from ahv_analysis.process_flight import NODES, controllers, node_class
-from ahv_msgs_py.base_node import SENDER_DEPTH, message_class
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.process_per_node import NODES, controllers, node_class
+from ahv_msgs_py.node.base_node import SENDER_DEPTH, message_class
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, DIAGNOSTICS, LOOP_TOPICS, ODOMETRY, STATE
 

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from ahv_analysis.case import case_names
+from ahv_analysis.flight.case import case_names
 from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 
 ROOT = Path(__file__).parent.parent
@@ -73,7 +73,8 @@ def test_launcher_becomes_the_program_of_its_name(tmp_path):
 
 @pytest.mark.skipif(not BUILDS_WHEELS, reason="this setuptools cannot build a wheel")
 def test_wheel_carries_what_ros_looks_for(setup, tmp_path):
-    for name in (*setup["packages"], "config", "launch", "resource"):
+    packages = {package.partition(".")[0] for package in setup["packages"]}
+    for name in (*packages, "config", "launch", "resource"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in BUILT_FROM:
         shutil.copy(ROOT / name, tmp_path)
@@ -90,7 +91,9 @@ def test_wheel_carries_what_ros_looks_for(setup, tmp_path):
     expected += [f"ahv/config/viewers/{path.name}" for path in ROOT.glob("config/viewers/*")]
     expected += ["ahv/launch/flight.launch.py", "ahv/launch/replay.launch.py"]
     assert {f"{data}/share/{name}" for name in expected} <= set(modes)
-    assert {f"ahv_analysis/page/{path.name}" for path in ROOT.glob("*/page/*")} <= set(modes)
+    sources = [path for path in ROOT.glob("ahv_*/**/*") if path.is_file()]
+    ours = {str(path.relative_to(ROOT)) for path in sources if path.suffix != ".pyc"}
+    assert ours <= set(modes)
     assert not [name for name in modes if name.startswith("test")]
 
 

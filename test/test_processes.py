@@ -10,19 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.case import load_case
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.record import record
 from ahv_analysis.errors import GraphError
-from ahv_analysis.fault_campaign import EXPECTED, NODES, Spectator, draw_injections, run_campaign
-from ahv_analysis.faulty_node import wrong_messages
-from ahv_analysis.flight import fly
-from ahv_analysis.process_flight import PROFILES, ProcessGraph, fly_processes, set_transport
-from ahv_analysis.record import record
-from ahv_msgs_py.faults import PERIOD
-from ahv_msgs_py.node_process import DISCOVERY_RANGE
-from ahv_msgs_py.real_time import PRIORITY
+from ahv_analysis.faults.campaign import EXPECTED, NODES, Spectator, draw_injections, run_campaign
+from ahv_analysis.faults.faulty_node import wrong_messages
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly
+from ahv_analysis.flight.process_per_node import (
+    PROFILES,
+    ProcessGraph,
+    fly_processes,
+    set_transport,
+)
+from ahv_msgs_py.node.faults import PERIOD
+from ahv_msgs_py.node.process import DISCOVERY_RANGE
+from ahv_msgs_py.node.real_time import PRIORITY
 from ahv_msgs_py.topics import SURFACE_COMMAND
-from ahv_plant.constants import DEGREES, STEP_NS
+from ahv_plant.model.constants import DEGREES, STEP_NS
 
 CASE = "neuro_adaptive_sc_gdi"
 TRACKING = 0.5  # [deg], [deg/s] within which a disturbed flight is back

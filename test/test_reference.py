@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import rclpy
 
-from ahv_analysis.case import load_case
-from ahv_analysis.graph_flight import fly_graph
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.one_process import fly_graph
 from ahv_analysis.reference import MARKED, PARTS, ROUTES, filled
 from ahv_msgs_py.topics import LOOP_TOPICS, QUEUE_DEPTH
 

@@ -19,19 +19,19 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
-from ahv_analysis.bag_writer import BagWriter
-from ahv_analysis.case import case_names, load_case, notes
-from ahv_analysis.command import app
+from ahv_analysis.bag.writer import BagWriter
+from ahv_analysis.command.main import app
 from ahv_analysis.errors import BagError, GraphError
-from ahv_analysis.flight import fly_library
-from ahv_analysis.graph_flight import fly_graph
-from ahv_analysis.process_flight import controllers, node_class
-from ahv_analysis.replay import ANSWERS, replay
-from ahv_analysis.replay_inputs import read_recording
-from ahv_analysis.replay_result import total
+from ahv_analysis.flight.case import case_names, load_case, notes
+from ahv_analysis.flight.library import fly_library
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_analysis.flight.process_per_node import controllers, node_class
+from ahv_analysis.replay.inputs import read_recording
+from ahv_analysis.replay.replay import ANSWERS, replay
+from ahv_analysis.replay.result import total
 from ahv_control.inner_loop_node import InnerLoopNode
 from ahv_control.outer_intermediate_node import OuterIntermediateNode
-from ahv_msgs_py.base_node import message_class, quality
+from ahv_msgs_py.node.base_node import message_class, quality
 from ahv_msgs_py.topics import (
     LEARNER_TOPICS,
     LOOP_TOPICS,
@@ -288,7 +288,7 @@ def test_a_node_that_falls_silent_is_missing_its_commands(ahv, bags, monkeypatch
 
 
 def test_a_node_that_stops_is_reported(bags, monkeypatch):
-    monkeypatch.setattr("ahv_analysis.replay.LONGEST_SILENCE", 0.3)
+    monkeypatch.setattr("ahv_analysis.replay.replay.LONGEST_SILENCE", 0.3)
     monkeypatch.setattr("ahv_control.velocity_node.VelocityNode._answer", lambda *arguments: None)
     with pytest.raises(GraphError, match="100 commands up to 1 s have not come"):
         again(bags / "nominal_di", load_case("nominal_di"))
@@ -428,7 +428,7 @@ def launch(monkeypatch):
 def test_launch_replays_where_tools_can_watch(launch):
     python, *command = launch(bag="flights/one/bag")
     assert python == sys.executable
-    assert command[:3] == ["-m", "ahv_analysis.command", "replay"]
+    assert command[:3] == ["-m", "ahv_analysis.command.main", "replay"]
     assert command[3:] == ["flights/one/bag", "--rate", "1.0"]
 
 

@@ -13,12 +13,14 @@ import pytest
 from playwright.sync_api import sync_playwright
 from typer.testing import CliRunner
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.bag_writer import BagWriter
-from ahv_analysis.case import Draw, load_case
-from ahv_analysis.command import app
-from ahv_analysis.flight import fly, fly_library, write_step
-from ahv_analysis.metrics import (
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.record import record
+from ahv_analysis.bag.writer import BagWriter
+from ahv_analysis.command.main import app
+from ahv_analysis.flight.case import Draw, load_case
+from ahv_analysis.flight.library import fly, fly_library, write_step
+from ahv_analysis.flight.summary import summarize
+from ahv_analysis.report.metrics import (
     held,
     margin,
     margins,
@@ -30,11 +32,9 @@ from ahv_analysis.metrics import (
     use,
     why_ended_early,
 )
-from ahv_analysis.record import record
-from ahv_analysis.report_flight import page_names, read_flights
-from ahv_analysis.report_page import number, render
-from ahv_analysis.summary import summarize
-from ahv_plant.constants import RADIANS
+from ahv_analysis.report.page import number, render
+from ahv_analysis.report.page_flight import page_names, read_flights
+from ahv_plant.model.constants import RADIANS
 
 TIME = np.arange(10001) * 0.01  # [s] to 100 s
 EVERY = slice(None, -1)  # sample but the last: whole periods

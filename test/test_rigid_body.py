@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ahv_plant.aerodynamics import Loads
-from ahv_plant.constants import GRAVITY, STEP
-from ahv_plant.mass_properties import Inertia
-from ahv_plant.rigid_body import angular_acceleration, motion
+from ahv_plant.model.aerodynamics import Loads
+from ahv_plant.model.constants import GRAVITY, STEP
+from ahv_plant.model.mass import Inertia
+from ahv_plant.model.rigid_body import angular_acceleration, motion
 from test.flights import STATES, between
 
 pytestmark = pytest.mark.unit

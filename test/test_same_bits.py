@@ -10,14 +10,15 @@ import hashlib
 import math
 import random
 
-from ahv_analysis.case import load_case
-from ahv_analysis.flight import fly
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly
 from ahv_control.newton_raphson import angular_response, flight_condition, solve_surfaces
 from ahv_control.intermediate_loop import Rates
-from ahv_plant import aerodynamic_fits, elementary
-from ahv_plant.atmosphere import atmosphere
+from ahv_plant.model import aerodynamic_fits
+from ahv_plant.numerics import elementary
+from ahv_plant.model.atmosphere import atmosphere
 from ahv_plant.dispersion import AxisDisturbance, Disturbance, Truth, draw_dispersion
-from ahv_plant.state import State, Surfaces
+from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.vehicle import state_rate, vehicle_step
 
 

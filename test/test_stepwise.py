@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahv_msgs_py.stepwise import Stepwise
+from ahv_msgs_py.node.synchronizer import Stepwise
 
 pytestmark = pytest.mark.unit
 

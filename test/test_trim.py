@@ -4,8 +4,8 @@
 import pytest
 from hypothesis import given, settings
 
-from ahv_plant.constants import DEGREES
 from ahv_plant.dispersion import NOMINAL, Truth
+from ahv_plant.model.constants import DEGREES
 from ahv_plant.trim import trim
 from ahv_plant.vehicle import vehicle_step
 from test.flights import between

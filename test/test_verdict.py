@@ -3,13 +3,13 @@
 
 import pytest
 
-from ahv_analysis.block import fly_alone
-from ahv_analysis.case import load_case
-from ahv_analysis.flight import fly, fly_library
-from ahv_analysis.record import record
-from ahv_analysis.report_flight import read_flights
-from ahv_analysis.summary import summarize
-from ahv_analysis.tally import Cause
+from ahv_analysis.bag.record import record
+from ahv_analysis.campaign.batch import fly_alone
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly, fly_library
+from ahv_analysis.flight.outcome import Cause
+from ahv_analysis.flight.summary import summarize
+from ahv_analysis.report.page_flight import read_flights
 
 SHORT = {"duration": 2.0}
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from ahv_control.flight_control import NEUTRAL
 from ahv_plant.dispersion import Truth
-from ahv_plant.state import State
+from ahv_plant.model.vectors import State
 from ahv_plant.vehicle import state_rate
 from ahv_plant.viewer_pose import FLU_IN_FRD, NED_IN_ENU, enu_pose, ned_pose, winged_cone
 from test.flights import STATES

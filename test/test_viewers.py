@@ -11,10 +11,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from ahv_analysis.bag_reader import read_bag
-from ahv_analysis.case import config_folder, load_case
-from ahv_analysis.graph_flight import fly_graph
-from ahv_plant.constants import DEGREES
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.flight.case import config_folder, load_case
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_plant.model.constants import DEGREES
 
 PLOTJUGGLER = config_folder() / "viewers" / "plotjuggler.xml"
 FOXGLOVE = config_folder() / "viewers" / "foxglove.json"

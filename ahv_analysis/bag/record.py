@@ -1,0 +1,130 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A flight as arrays, whether it comes from a bag or from memory, and what is derived from it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahv_analysis.flight.library import Step
+from ahv_control.disturbance_learner import disturbance_estimate
+from ahv_control.intermediate_loop import Rates
+from ahv_control.learner_message import learner_values
+from ahv_control.newton_raphson import nominal_response
+from ahv_msgs_py.layout import NANOSECONDS
+from ahv_plant.model.aerodynamics import AirData, air_data
+from ahv_plant.model.constants import UNSTART_ALPHA
+from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.numerics.elementwise import kernel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FlightRecord:
+    """N + 1 states and the commands that answer them."""
+
+    stamps: NDArray[np.int64]  # (N+1,) [ns]
+    states: Array  # (N+1, 13) in the order and units of State
+    attitude_commands: Array  # (N+1, 3) [rad]
+    rate_commands: Array  # (N+1, 3) [rad/s]
+    surfaces: Array  # (N+1, 3) [rad]
+    throttle: Array  # (N+1,) [-]
+    geometric: bool  # h is a geometric altitude
+    learner: Array | None = None  # (N+1, 39) X_a, X_d [rad/s] and weights, of an adaptive flight
+    estimates: Array | None = None  # (N+1, 3) d-hat [rad/s^2], of an adaptive flight
+
+    @property
+    def steps(self) -> int:
+        """Number of integration steps N."""
+        return len(self.stamps) - 1
+
+    @property
+    def time(self) -> Array:
+        """Time (N+1,) [s]."""
+        return self.stamps / NANOSECONDS
+
+    def column(self, name: str) -> Array:
+        """One state (N+1,) by its name."""
+        column: Array = self.states[:, State._fields.index(name)]
+        return column
+
+    @cached_property
+    def air(self) -> AirData:
+        """Air data, every field an array (N+1,)."""
+        rows = np.empty((len(self.states), len(AirData._fields)))
+        _fill_air_data(np.ascontiguousarray(self.states), self.geometric, rows)
+        return AirData(*np.ascontiguousarray(rows.T))
+
+    @cached_property
+    def climb_angle(self) -> Array:
+        """Flight path angle gamma (N+1,) [rad], the angle of the velocity above the horizon."""
+        u, v, w = (self.column(name) for name in "uvw")
+        phi, theta = self.column("phi"), self.column("theta")
+        down = v * np.sin(phi) + w * np.cos(phi)
+        climb = u * np.sin(theta) - down * np.cos(theta)
+        angle: Array = np.arcsin(climb / self.air.speed)
+        return angle
+
+    @property
+    def observer_error(self) -> Array | None:
+        """X - X_a (N+1, 3) [rad/s], the error of eq 4.9; None without a learner."""
+        return None if self.learner is None else self.states[:, 3:6] - self.learner[:, :3]
+
+    @cached_property
+    def actual_disturbance(self) -> Array:
+        """What the nominal model misses of the angular acceleration (N, 3) [rad/s^2], eq 4.2.
+
+        Of each step: the mean acceleration, (X_k+1 - X_k) / h, less the nominal f(X_k, U_k). That
+        is what the learner has to learn.
+        """
+        answers = zip(self.states[:-1].tolist(), self.surfaces[:-1].tolist(), strict=True)
+        nominal = [
+            nominal_response(State(*state), Surfaces(*surfaces), self.geometric)
+            for state, surfaces in answers
+        ]
+        mean = np.diff(self.states[:, 3:6], axis=0) / np.diff(self.time)[:, None]
+        return mean - np.reshape(nominal, (-1, 3))
+
+    @property
+    def inlet_started(self) -> bool:
+        """Whether the inlet stayed started: |alpha| <= 5 deg throughout."""
+        return bool(np.all(np.abs(self.air.alpha) <= UNSTART_ALPHA))
+
+
+@kernel
+def _fill_air_data(states, geometric, rows):
+    """Fill `rows` (n, 7) with the air data of `states` (n, 13)."""
+    for step in range(len(states)):
+        s = states[step]
+        state = State(
+            s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11], s[12]
+        )
+        row, air = rows[step], air_data(state, geometric)
+        row[0], row[1], row[2], row[3] = air.speed, air.alpha, air.beta, air.mach
+        row[4], row[5], row[6] = air.dynamic_pressure, air.sin_alpha, air.cos_alpha
+
+
+def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
+    """Arrays of the steps of a library flight."""
+    flown = list(steps)
+    answers = [step.commands for step in flown]
+    learners = [learner_values(step.learner) for step in flown if step.learner]
+    estimates = [
+        disturbance_estimate(step.learner, Rates(step.state.P, step.state.Q, step.state.R))
+        for step in flown
+        if step.learner
+    ]
+    return FlightRecord(
+        np.array([step.stamp for step in flown]),
+        np.array([step.state for step in flown]),
+        np.array([answer.attitude for answer in answers]),
+        np.array([answer.rates for answer in answers]),
+        np.array([answer.surfaces for answer in answers]),
+        np.array([answer.throttle for answer in answers]),
+        geometric,
+        np.array(learners) if learners else None,
+        np.array(estimates) if estimates else None,
+    )

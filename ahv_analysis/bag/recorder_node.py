@@ -1,0 +1,194 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Node `recorder`: every topic of the graph into an MCAP bag, the bytes as they came."""
+
+import time
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
+from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
+
+from ahv_analysis.bag.writer import BagWriter
+from ahv_analysis.errors import BagError
+from ahv_msgs_py.node.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.node.health import ERROR, OK
+from ahv_msgs_py.node.process import run
+from ahv_msgs_py.parameters import Parameter, ParameterError, Value
+from ahv_msgs_py.topics import (
+    DIAGNOSTICS,
+    LOOP_TOPICS,
+    NAMESPACE,
+    NOMINAL_TOPICS,
+    VIEWER_TOPICS,
+    LoopTopic,
+)
+
+STOP, CONTINUE = "stop", "continue"
+RECORDER_PARAMETERS = (
+    Parameter("bag", "bag", "folder of the bag to write; it must not exist"),
+    Parameter("notes", "", "text to file with the bag"),
+    Parameter(
+        "on_error",
+        STOP,
+        f"when the disk fails: {STOP} ends the recorder and with it the flight, "
+        f"{CONTINUE} lets them go on without a record",
+    ),
+)
+POLL = 0.02  # [s] of wall time between looks at the topics
+POLLS = 5  # looks that a chunk has the messages of
+QUIET = 0.5  # [s] after the end of a flight in real time, for what is still under way
+
+
+class RecorderNode(BaseNode):
+    """Listens to every topic; the bag is complete once the node is destroyed.
+
+    It takes what has come every `POLL`, all messages of a topic in one go, which costs a flight
+    half of what a call for each message would. A message is on its way to the disk a tenth of a
+    second after it came, with every fifth look.
+
+    `finished` is set when the flight is over and all of its messages are in the bag, or with the
+    reason why the recording ended early; `failure` has that reason whatever `on_error` is.
+    """
+
+    def __init__(
+        self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
+    ):
+        """`values` overrides parameters; ParameterError if the bag cannot be made."""
+        self._polled: dict[str, Subscription] = {}
+        super().__init__("recorder", RECORDER_PARAMETERS, values, context)
+        self.failure: BagError | None = None
+        self._bag: BagWriter | None = None
+        self._polls = 0
+        self._steps: int | None = None  # of the flight, once it is over
+        self._over = 0.0  # [s] by the steady clock when it was
+        self._flown: Sequence[LoopTopic] = ()  # topics of the loop that flew
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Make the bag."""
+        if settings["on_error"] not in (STOP, CONTINUE):
+            raise ParameterError(
+                f"recorder: on_error is {settings['on_error']!r}, but must be {STOP} or {CONTINUE}"
+            )
+        try:
+            self._bag = BagWriter(
+                Path(str(settings["bag"])), str(settings["notes"]), background=self.realtime
+            )
+        except BagError as error:
+            raise ParameterError(f"recorder: bag: {error}") from error
+
+    def start(self) -> None:
+        """Listen to every topic; in real time as in lockstep nothing may be missed."""
+        durable = not self.realtime
+        topics = [(topic.name, topic.layout.type_name, durable) for topic in LOOP_TOPICS]
+        topics += [(topic.name, topic.type_name, topic.durable) for topic in VIEWER_TOPICS]
+        for name, type_name, durable in topics:
+            try:
+                message_type = message_class(type_name)
+            except ModuleNotFoundError:
+                continue  # /tf without tf2_msgs installed: then nobody here can send it either
+            subscription = self.create_subscription(
+                message_type, name, lambda data: None, quality(durable), raw=True
+            )
+            self._polled[name] = subscription
+            self._opened.append(partial(self.destroy_subscription, subscription))
+            self._opened.append(partial(self._polled.pop, name))
+        timer = self.create_timer(POLL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._opened.append(partial(self.destroy_timer, timer))
+        self._opened.append(self._take)  # first of all to be done when the topics are closed
+        self.announce(0, OK, f"recording to {self._bag.path}")
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Those that an executor is to call back for: not the topics, which are polled."""
+        polled = self._polled.values()
+        return (one for one in super().subscriptions if one not in polled)
+
+    def _poll(self) -> None:
+        """Take what has come; see whether that was all."""
+        self._take()
+        self._polls += 1
+        if self._polls % POLLS == 0 and self.failure is None:
+            self._bag.flush()
+        if self._steps is None:
+            return
+        if self.failure is not None:
+            self._end(str(self.failure))
+        elif self.realtime:  # messages may be missing; what comes comes soon
+            if time.monotonic() - self._over > QUIET:
+                self._end("")
+        elif not self.missing(self._flown, self._steps):
+            self._end("")
+
+    def _take(self) -> None:
+        for topic, subscription in self._polled.items():
+            messages = _waiting(subscription)
+            if messages and self.failure is None:
+                try:
+                    self._bag.write(topic, *messages)
+                except BagError as error:
+                    self._fail(error)
+            if topic == DIAGNOSTICS.name:
+                for data in messages:
+                    self._read_status(data)
+
+    def _fail(self, error: BagError) -> None:
+        """Say once that the recording has ended, and end the node if it is set so."""
+        self.failure = error
+        self.get_logger().error(str(error))
+        self.announce(self._bag.now, ERROR, str(error))
+        if self.settings["on_error"] == STOP:
+            self._end(str(error))
+
+    def _end(self, reason: str) -> None:
+        if not self.finished.done():
+            self.finished.set_result(reason)
+
+    def _read_status(self, data: bytes) -> None:
+        """Learn from the plant that the flight is over, and after how many steps."""
+        for status in deserialize_message(data, DiagnosticArray).status:
+            facts = {fact.key: fact.value for fact in status.values}
+            if status.name == f"{NAMESPACE}/plant" and "over" in facts:
+                self._steps = int(facts["steps"])
+                self._over = time.monotonic()
+                self._flown = [
+                    topic
+                    for topic in LOOP_TOPICS
+                    if topic in NOMINAL_TOPICS or self.count_publishers(topic.name)
+                ]
+
+    def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:
+        """How many messages of these topics are still to come from a flight of so many steps."""
+        return sum(max(0, steps + 1 - self._bag.counts[topic.name]) for topic in topics)
+
+    def balance(self, topics: Sequence[LoopTopic], steps: int) -> int:
+        """How many messages the bag lacks of a flight of so many steps; negative: others flew."""
+        return sum(steps + 1 - self._bag.counts[topic.name] for topic in topics)
+
+    def destroy_node(self) -> None:
+        """Close the bag, then the node."""
+        if self._bag is not None:
+            self._take()
+            try:
+                self._bag.close()
+            except BagError as error:
+                if self.failure is None:
+                    self._fail(error)
+        super().destroy_node()
+
+
+def _waiting(subscription: Subscription) -> list[bytes]:
+    """Messages that have come on a topic, in their order."""
+    handle: Any = subscription.handle
+    with handle:
+        take = partial(handle.take_message, subscription.msg_type, True)
+        return [data for data, _ in iter(take, None)]
+
+
+def main() -> None:
+    """Run the node."""
+    run(RecorderNode)

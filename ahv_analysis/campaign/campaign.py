@@ -1,0 +1,260 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Monte-Carlo campaigns: drawn flights on any executor, one row a run, resumed if stopped."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ahv_analysis.bag.record import Array
+from ahv_analysis.campaign.batch import find_trims, fly_block
+from ahv_analysis.campaign.store import (
+    PART_RUNS,
+    Columns,
+    level_folder,
+    part_file,
+    part_files,
+    read_part,
+    read_parts,
+    write_part,
+)
+from ahv_analysis.errors import CampaignError
+from ahv_analysis.flight.case import Case, Draw, dispersion_parameters, make_case
+from ahv_analysis.flight.outcome import Tally
+from ahv_plant.dispersion import Dispersion, draw_dispersion
+from ahv_plant.level_trim import LevelTrim
+from ahv_plant.model.constants import DEGREES, STEP
+from ahv_plant.model.vectors import State
+from ahv_plant.numerics.elementwise import source_hash
+
+RUNS_PER_JOB = 64  # four blocks: half a second of work, so that little is lost and little waits
+JOBS_UNDER_WAY = 64  # handed to the executor at a time, so that a campaign of any size can wait
+# Random starts of section 3.5.2, around the case's own: plus and minus, in the plant's parameters.
+START_SPREAD = {
+    "initial.u": 100.0,  # [m/s]
+    "initial.P": 5.0,  # [deg/s]
+    "initial.Q": 5.0,  # [deg/s]
+    "initial.R": 5.0,  # [deg/s]
+    "initial.h": 500.0,  # [m]
+}
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is flown: `runs` vehicles drawn at a level [-], from one start or from random ones."""
+
+    case: Case
+    level: float
+    runs: int
+    seed: int
+    random_starts: bool = False
+
+    def describe(self) -> dict[str, Any]:
+        """All that decides the result of a run: the code too, but not the number of runs."""
+        return {
+            "source": source_hash(),
+            "case": self.case.name,
+            "level": self.level,
+            "seed": self.seed,
+            "random_starts": self.random_starts,
+            "parameters": self.case.parameters,
+        }
+
+    def dispersion(self, run: int) -> Dispersion:
+        """Dispersion of a run."""
+        return draw_dispersion(self.level, self.seed, run)
+
+    def start(self, run: int) -> State:
+        """First state of a run."""
+        return self.case_of(run).plant.initial if self.random_starts else self.case.plant.initial
+
+    def case_of(self, run: int) -> Case:
+        """Return the case that flies one run alone, with the same bits, by any engine."""
+        plant = self.case.parameters["plant"] | dispersion_parameters(self.dispersion(run))
+        if self.random_starts:
+            draws = np.random.default_rng((self.seed, run, 1)).uniform(
+                -1.0, 1.0, len(START_SPREAD)
+            )
+            for (name, spread), draw in zip(START_SPREAD.items(), draws.tolist(), strict=True):
+                plant[name] = float(plant[name]) + spread * draw
+        draw = Draw(self.level, self.seed, run, self.random_starts)
+        return make_case(self.case.name, self.case.parameters | {"plant": plant}, draw)
+
+
+def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
+    """Fly runs `first` to `first + count - 1`: a column a quantity, as in the campaign's file."""
+    runs = range(first, first + count)
+    dispersions = np.array([campaign.dispersion(run) for run in runs])
+    states = np.array([campaign.start(run) for run in runs])
+    case = campaign.case
+    control, geometric = case.control, case.plant.truth.geometric
+    tallies = fly_block(states, dispersions, case.plant.truth, control, case.plant.steps)
+    trims = find_trims(
+        dispersions,
+        control.outer.altitude,
+        control.velocity.speed,
+        case.plant.initial.mass,
+        geometric,
+    )
+    trim = LevelTrim(*trims.T)
+    return flight_columns(np.array(runs), dispersions, states, tallies) | {
+        "trim_exists": trim.exists == 1.0,
+        "trim_alpha_deg": trim.alpha * DEGREES,
+    }
+
+
+def flight_columns(runs: Array, dispersions: Array, states: Array, tallies: Array) -> Columns:
+    """Columns of the campaign's file that a flight gives."""
+    tally = Tally(*tallies.T)
+    table: Columns = {"run": runs}
+    table |= {name: dispersions[:, i] for i, name in enumerate(Dispersion._fields)}
+    table |= {
+        f"initial_{name}": states[:, State._fields.index(name)] for name in ("u", *"PQR", "h")
+    }
+    return table | {
+        "cause": tally.cause.astype(np.int64),
+        "time_s": np.maximum(tally.steps - 1, 0) * STEP,
+        "max_abs_alpha_deg": tally.max_abs_alpha * DEGREES,
+        "alpha_margin_deg": 5.0 - tally.max_abs_alpha * DEGREES,
+        "max_abs_beta_deg": tally.max_abs_beta * DEGREES,
+        "max_abs_rate_dps": tally.max_abs_rate * DEGREES,
+        "max_abs_phi_deg": tally.max_abs_phi * DEGREES,
+        "min_surface_deg": tally.min_surface * DEGREES,
+        "max_surface_deg": tally.max_surface * DEGREES,
+        "min_throttle": tally.min_throttle,
+        "max_throttle": tally.max_throttle,
+        "max_altitude_error_m": tally.max_altitude_error,
+        "max_observer_error_dps": tally.max_observer_error * DEGREES,
+        "final_altitude_m": tally.final_altitude,
+        "final_speed_mps": tally.final_speed,
+    }
+
+
+def fly_campaign(
+    campaign: Campaign,
+    folder: Path,
+    executor: Executor,
+    progress: Callable[[int], None] = lambda runs: None,
+) -> None:
+    """Fly what `folder` does not hold yet of `campaign`, and keep it there.
+
+    Jobs go to `executor`, whatever it is; a job that fails is an error, one whose worker died is
+    the executor's to repeat. A part is written when all of it is flown. Interrupted, by
+    KeyboardInterrupt or an error, the folder keeps what was flown. `progress(runs)` is called now
+    and then. Raises CampaignError if the folder holds another campaign or cannot hold any.
+    """
+    kept = level_folder(folder, campaign.level)
+    try:
+        kept.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CampaignError(f"{folder} cannot hold a campaign: {error.strerror}") from error
+    described = campaign.describe()
+    count = sum(
+        int(np.sum(part["run"] < campaign.runs)) for part in read_parts(kept, ["run"], described)
+    )
+    progress(count)
+    parts: dict[int, _Part] = {}
+    jobs = _jobs(campaign, kept, parts)
+    under_way: dict[Future[Columns], int] = {}
+    try:
+        while True:
+            for start, first, runs in islice(jobs, JOBS_UNDER_WAY - len(under_way)):
+                under_way[executor.submit(fly_runs, campaign, first, runs)] = start
+            if not under_way:
+                break
+            finished, _ = wait(under_way, return_when=FIRST_COMPLETED)
+            for future in finished:
+                start = under_way.pop(future)
+                part = parts[start]
+                part.flown.append(future.result())
+                count += len(part.flown[-1]["run"])
+                part.jobs_left -= 1
+                if part.jobs_left == 0:
+                    write_part(part_file(kept, start), [*part.held, *part.flown], described)
+                    del parts[start]
+            progress(min(count, campaign.runs))
+    finally:
+        for future, start in under_way.items():  # of an interrupted campaign
+            future.cancel()
+            if future.done() and not future.cancelled() and future.exception() is None:
+                parts[start].flown.append(future.result())
+        for start, part in parts.items():
+            if part.flown:
+                write_part(part_file(kept, start), [*part.held, *part.flown], described)
+
+
+@dataclass
+class _Part:
+    """A part of which not everything is flown."""
+
+    held: list[Columns]  # by the folder
+    flown: list[Columns]
+    jobs_left: int
+
+
+def _jobs(
+    campaign: Campaign, kept: Path, parts: dict[int, _Part]
+) -> Iterator[tuple[int, int, int]]:
+    """Jobs that are left to fly: first run of its part, first run, number of runs.
+
+    A part enters `parts` with its first job, so that only those under way are in memory.
+    """
+    for start in range(0, campaign.runs, PART_RUNS):
+        end = min(start + PART_RUNS, campaign.runs)
+        path = part_file(kept, start)
+        held = [read_part(path)[0]] if path.exists() else []
+        done = set(held[0]["run"].tolist()) if held else set()
+        jobs = [
+            (start, first, min(RUNS_PER_JOB, end - first))
+            for first in range(start, end, RUNS_PER_JOB)
+            if not done.issuperset(range(first, min(first + RUNS_PER_JOB, end)))
+        ]
+        if jobs:
+            parts[start] = _Part(held, [], len(jobs))
+        yield from jobs
+
+
+def open_campaign(folder: Path, level: float | None = None) -> Campaign:
+    """Campaign that a folder holds, of `level` if it holds several."""
+    found = {path.name.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*"))}
+    chosen = [name for name in found if level is None or name == f"{level:g}"]
+    if len(chosen) != 1:
+        raise CampaignError(
+            f"{folder} holds {len(chosen)} campaigns to choose from by --level; "
+            f"there are: {', '.join(found) or 'none'}"
+        )
+    files = part_files(found[chosen[0]])
+    if not files:
+        raise CampaignError(f"{found[chosen[0]]} holds no runs of a campaign")
+    last, description = read_part(files[-1], ["run"])
+    return Campaign(
+        make_case(description["case"], description["parameters"]),
+        description["level"],
+        int(last["run"][-1]) + 1,
+        description["seed"],
+        description["random_starts"],
+    )
+
+
+def find_run(campaign: Campaign, folder: Path, run: int) -> dict[str, Any] | None:
+    """Row of a run, None if it has not been flown."""
+    path = part_file(level_folder(folder, campaign.level), run - run % PART_RUNS)
+    if not path.exists():
+        return None
+    columns, _ = read_part(path)
+    index = np.flatnonzero(columns["run"] == run)
+    return {name: column[index[0]] for name, column in columns.items()} if len(index) else None
+
+
+def first_causes(campaign: Campaign, folder: Path, runs: int) -> dict[int, int]:
+    """Causes of failure of the first `runs` runs that were flown, zero for success."""
+    causes: dict[int, int] = {}
+    for part in read_parts(level_folder(folder, campaign.level), ["run", "cause"]):
+        causes |= zip(part["run"].tolist(), part["cause"].tolist(), strict=True)
+        if len(causes) >= runs:
+            break
+    return dict(islice(causes.items(), runs))

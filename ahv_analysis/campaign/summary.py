@@ -1,0 +1,72 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""What a campaign came to, counted part by part."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from ahv_analysis.campaign.campaign import Campaign
+from ahv_analysis.campaign.store import Columns, level_folder, read_parts
+from ahv_analysis.flight.outcome import Cause
+
+COUNTED = ("run", "cause", "time_s", "trim_exists", "trim_alpha_deg")
+
+
+@dataclass
+class Counts:
+    """Counts of runs, and the time that they flew together."""
+
+    causes: Counter[int] = field(default_factory=Counter)  # by Cause
+    holdable: int = 0  # with a trim inside the limits at the commanded altitude
+    failed_without_trim: int = 0
+    flown_s: float = 0.0
+
+
+def count_runs(parts: Iterable[Columns], runs: int) -> Counts:
+    """Count the runs below `runs` of all `parts`, which have the columns COUNTED."""
+    counts = Counts()
+    for part in parts:
+        asked = part["run"] < runs
+        cause = part["cause"][asked]
+        holdable = part["trim_exists"] & (np.abs(part["trim_alpha_deg"]) <= 5.0)
+        holdable = holdable[asked]
+        counts.causes.update(cause.tolist())
+        counts.holdable += int(np.sum(holdable))
+        counts.failed_without_trim += int(np.sum(~holdable & (cause != Cause.SUCCESS)))
+        counts.flown_s += float(np.sum(part["time_s"][asked]))
+    return counts
+
+
+def exact_interval(successes: int, runs: int) -> tuple[float, float]:
+    """Clopper-Pearson 95 % interval of a success rate."""
+    interval = binomtest(successes, runs).proportion_ci(method="exact")
+    return float(interval.low), float(interval.high)
+
+
+def summarize_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
+    """Counts of a campaign, with the bound that no altitude-holding controller beats."""
+    parts = read_parts(level_folder(folder, campaign.level), COUNTED, campaign.describe())
+    counts = count_runs(parts, campaign.runs)
+    runs, successes = counts.causes.total(), counts.causes[Cause.SUCCESS]
+    failures = {
+        cause.name.lower(): counts.causes[cause]
+        for cause in Cause
+        if cause != Cause.SUCCESS and counts.causes[cause]
+    }
+    return {
+        "controller": campaign.case.name,
+        "level": campaign.level,
+        "runs": runs,
+        "successes": successes,
+        "success_rate": successes / runs,
+        "interval": exact_interval(successes, runs),
+        "failures": failures,
+        "trim_within_5_deg": counts.holdable,
+        "failures_without_such_trim": counts.failed_without_trim,
+        "flown_s": counts.flown_s,
+    }

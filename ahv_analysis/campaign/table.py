@@ -1,0 +1,106 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Table 5.1 of the report, beside the same campaign flown here."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ahv_analysis.campaign.campaign import Campaign, fly_campaign
+from ahv_analysis.campaign.summary import exact_interval, summarize_campaign
+from ahv_analysis.flight.case import load_case
+
+
+class Reported(NamedTuple):
+    """A row of Table 5.1."""
+
+    level: float
+    trials: int
+    successes: dict[str, int]  # by controller
+
+
+REPORT = (
+    Reported(0.1, 3697, {"neuro_adaptive_sc_gdi": 3697, "neuro_adaptive_di": 3697}),
+    Reported(0.2, 3660, {"neuro_adaptive_sc_gdi": 3660, "neuro_adaptive_di": 3660}),
+    Reported(0.3, 3602, {"neuro_adaptive_sc_gdi": 3594, "neuro_adaptive_di": 3580}),
+    Reported(0.4, 3873, {"neuro_adaptive_sc_gdi": 3455, "neuro_adaptive_di": 3371}),
+)
+CONTROLLERS = ("neuro_adaptive_sc_gdi", "neuro_adaptive_di")
+
+
+class Row(NamedTuple):
+    """A cell of the table: the report's count and ours."""
+
+    trials: int  # of the report
+    reported: int  # successes of the report
+    reported_interval: tuple[float, float]
+    flown: dict[str, Any]  # summary of the campaign
+
+    @property
+    def verdict(self) -> str:
+        """Where our rate lies against the report's 95 % interval."""
+        low, high = self.reported_interval
+        rate = self.flown["success_rate"]
+        return "below" if rate < low else "above" if rate > high else "within"
+
+
+def fly_table(
+    folder: Path,
+    executor: Executor,
+    seed: int,
+    runs: int | None,
+    protected: bool,
+    progress: Callable[[int], None],
+) -> list[Row]:
+    """Fly every cell of the table; `runs` replaces the report's numbers of trials."""
+    rows = []
+    before = 0
+    for controller in CONTROLLERS:
+        case = load_case(controller + ("_protected" if protected else ""))
+        for reported in REPORT:
+            campaign = Campaign(case, reported.level, runs or reported.trials, seed)
+            fly_campaign(
+                campaign,
+                folder / case.name,
+                executor,
+                lambda done, before=before: progress(before + done),
+            )
+            before += campaign.runs
+            successes = reported.successes[controller]
+            rows.append(
+                Row(
+                    reported.trials,
+                    successes,
+                    exact_interval(successes, reported.trials),
+                    summarize_campaign(campaign, folder / case.name),
+                )
+            )
+    return rows
+
+
+def total_runs(runs: int | None) -> int:
+    """Number of flights of the table."""
+    return len(CONTROLLERS) * sum(runs or reported.trials for reported in REPORT)
+
+
+def percent(interval: Sequence[float]) -> str:
+    """Return an interval in words."""
+    return f"[{100 * interval[0]:.2f}, {100 * interval[1]:.2f}]"
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """Return the table as Markdown."""
+    lines = [
+        "| controller | level | trials | report % | report's 95 % | here % | here 95 % "
+        "| against the report | trim within 5 deg % |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        flown = row.flown
+        lines.append(
+            f"| {flown['controller']} | {100 * flown['level']:.0f} % | {flown['runs']} "
+            f"| {100 * row.reported / row.trials:.2f} | {percent(row.reported_interval)} "
+            f"| {100 * flown['success_rate']:.2f} | {percent(flown['interval'])} | {row.verdict} "
+            f"| {100 * flown['trim_within_5_deg'] / flown['runs']:.2f} |"
+        )
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,180 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""The commands `ahv bag`: what a bag holds, recovering a damaged one, exporting it."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ahv_analysis.command.console import (
+    Json,
+    UsageError,
+    console,
+    one_sentence,
+    print_json,
+    show_table,
+)
+from ahv_analysis.errors import BagError
+
+bag = typer.Typer(
+    help="Look into the bag of a flight, recover it, export it.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+Folder = Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag.")]
+UNDISPERSED = 1.0
+
+
+@bag.command()
+@one_sentence
+def info(path: Folder, as_json: Json = False) -> None:
+    """Say what a bag holds: what flew, for how long, and whether all of it is there."""
+    from ahv_analysis.bag.info import bag_info
+
+    facts = bag_info(path)
+    if as_json:
+        print_json(facts)
+        return
+    show_table(str(path), _rows(facts))
+    topics = [
+        (topic["name"], f"{topic['messages']} x {topic['type']}") for topic in facts["topics"]
+    ]
+    show_table("topics", topics)
+
+
+def _rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
+    rows = [
+        ("case", facts["case"] or "unknown: it has no notes of ahv"),
+        ("flown", _span(facts)),
+        ("complete", _completeness(facts)),
+    ]
+    if facts["notes"]:
+        plant = facts["notes"]["parameters"]["plant"]
+        dispersed = [
+            f"{name.removeprefix('dispersion.')} {value:g}"
+            for name, value in plant.items()
+            if name.startswith("dispersion.") and value != UNDISPERSED
+        ]
+        rows.append(("dispersion", ", ".join(dispersed) or "none"))
+    return [*rows, ("size", f"{facts['messages']} messages, {facts['bytes'] / 1e6:.1f} MB")]
+
+
+def _completeness(facts: dict[str, Any]) -> str:
+    answer = "yes" if facts["complete"] else "no"
+    if facts["recovered"] is None:
+        return answer
+    lost = facts["recovered"]["lost_messages"]
+    lost_words = "an unknown number of" if lost is None else str(lost)
+    return f"{answer}: recovered, {lost_words} messages lost"
+
+
+@bag.command()
+@one_sentence
+def recover(
+    path: Folder,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the recovered bag, which must not exist  [BAG-recovered]"),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write what is readable of a damaged bag to a new one, and say what was lost.
+
+    The damaged bag stays as it is.
+    """
+    from ahv_analysis.bag.recovery import recover as write_recovered
+
+    target = out or path.with_name(f"{path.name}-recovered")
+    recovery = write_recovered(path, target)
+    facts: dict[str, Any] = {"source": str(path), "recovered": None}
+    if recovery is not None:
+        flight = _flight(target)
+        facts |= {"recovered": str(target), **recovery.as_json(), **flight}
+    if as_json:
+        print_json(facts)
+    elif recovery is None:
+        console.print(f"{path} is whole: nothing to recover")
+    else:
+        lost = recovery.lost_messages
+        rows = [
+            ("recovered", f"{recovery.messages} messages, {_span(flight)}"),
+            ("lost", "an unknown number of messages" if lost is None else f"{lost} messages"),
+        ]
+        for loss in recovery.losses:
+            place = f" ({loss.size} bytes from byte {loss.offset} on)" if loss.size else ""
+            rows.append((loss.file, loss.what + place))
+        show_table(f"{path} -> {target}", rows)
+
+
+def _flight(path: Path) -> dict[str, Any]:
+    """How much of a flight a recovered bag holds; nothing known if a topic is lost altogether."""
+    from ahv_analysis.bag.info import bag_info
+
+    keys = ("duration_s", "planned_s", "steps", "missing_steps")
+    try:
+        facts = bag_info(path)
+    except BagError:
+        return dict.fromkeys(keys)
+    return {key: facts[key] for key in keys}
+
+
+def _span(facts: dict[str, Any]) -> str:
+    """How long was flown, in words."""
+    if facts["duration_s"] is None:
+        return "no step of a flight with all its messages"
+    planned = f" of {facts['planned_s']:g} s" if facts["planned_s"] else ""
+    missing = f", {facts['missing_steps']} are missing" if facts["missing_steps"] else ""
+    return f"{facts['duration_s']:g} s{planned}, {facts['steps']} steps{missing}"
+
+
+@bag.command()
+@one_sentence
+def export(
+    path: Folder,
+    csv: Annotated[Path | None, typer.Option(help="CSV file to write.")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="Parquet file to write.")] = None,
+    netcdf: Annotated[Path | None, typer.Option(help="netCDF file to write.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write the flight of a bag as a table: time, states, commands, learner, air data.
+
+    A file that exists is never overwritten.
+    """
+    files = {
+        kind: file
+        for kind, file in zip(("csv", "parquet", "netcdf"), (csv, parquet, netcdf), strict=True)
+        if file
+    }
+    if not files:
+        raise UsageError("nothing to export to: name a file with --csv, --parquet or --netcdf")
+    for file in files.values():
+        if file.exists():
+            raise UsageError(f"{file} exists already: choose another file")
+    from ahv_analysis.bag.dataset import EXPORTS, bag_dataset
+
+    flight = bag_dataset(path)
+    for kind, file in files.items():
+        content = EXPORTS[kind](flight)
+        try:
+            _write_new(file, content)
+        except OSError as error:
+            raise UsageError(f"cannot write {file}: {error.strerror}") from error
+    if as_json:
+        facts = {"signals": len(flight.data_vars), "samples": flight.sizes["time"]}
+        print_json({"bag": str(path), "files": {k: str(f) for k, f in files.items()}, **facts})
+    else:
+        for file in files.values():
+            console.print(
+                f"{flight.sizes['time']} samples of {len(flight.data_vars)} signals in {file}"
+            )
+
+
+def _write_new(file: Path, content: bytes) -> None:
+    """Write a file that does not exist; leave none behind that is cut off."""
+    with file.open("xb") as sink:
+        try:
+            sink.write(content)
+            sink.flush()
+        except OSError:
+            file.unlink()
+            raise

@@ -1,0 +1,268 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""The commands of campaigns: `ahv monte-carlo`, its `rerun`, and `ahv table`."""
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ahv_analysis.command.console import (
+    HIGHEST_LEVEL,
+    Json,
+    UsageError,
+    check_domain,
+    integer_option,
+    one_sentence,
+    print_json,
+    progress_bar,
+    show_table,
+)
+from ahv_plant.model.constants import STEP
+
+monte_carlo = typer.Typer(
+    help="Fly many drawn vehicles, and any of them again alone.",
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+
+@contextmanager
+def executor_of(workers: int, dask: str | None) -> Iterator[Executor]:
+    """Threads of this process, or a dask cluster."""
+    if dask is None:
+        pool = ThreadPoolExecutor(workers)
+        try:
+            yield pool
+        finally:
+            pool.shutdown(cancel_futures=True)
+        return
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        raise UsageError("--dask needs the extra ahv[dask]") from error
+    try:
+        client = Client(dask, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise UsageError(f"no dask scheduler answers at {dask}: {error}") from error
+    with client, client.get_executor(pure=False, retries=10) as pool:
+        yield pool
+
+
+Workers = Annotated[int, integer_option("Threads, by default one a core.", 1)]
+Dask = Annotated[str | None, typer.Option(help="Address of a dask scheduler to fly on.")]
+Seed = Annotated[int, integer_option("Seed of the draws.")]
+CORES = os.cpu_count() or 1
+
+
+@monte_carlo.callback(invoke_without_command=True)
+@one_sentence
+def fly(
+    context: typer.Context,
+    controller: Annotated[
+        str, typer.Option(help="Name of a case, whose start and settings are flown.")
+    ] = "neuro_adaptive_sc_gdi",
+    level: Annotated[
+        list[float] | None, typer.Option(help="Dispersion; may be given several times.")
+    ] = None,
+    runs: Annotated[int, integer_option("Vehicles a level.", 1)] = 1000,
+    seed: Seed = 0,
+    protected: Annotated[
+        bool, typer.Option("--protected", help="The case with angle-of-attack protection.")
+    ] = False,
+    random_starts: Annotated[
+        bool, typer.Option("--random-starts", help="Section 3.5.2's random starts as well.")
+    ] = False,
+    workers: Workers = CORES,
+    dask: Dask = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the campaign; one that is there is resumed.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly RUNS drawn vehicles a level; a folder of Parquet files a level, with a row a run."""
+    if context.invoked_subcommand is not None:
+        return
+    from ahv_analysis.campaign.campaign import Campaign, fly_campaign
+    from ahv_analysis.campaign.summary import summarize_campaign
+    from ahv_analysis.flight.case import load_case
+
+    levels = level or [0.3]
+    for one in levels:
+        if not 0.0 <= one <= HIGHEST_LEVEL:
+            raise UsageError(f"level {one:g} is outside 0 to {HIGHEST_LEVEL:g}")
+    case = load_case(controller + ("_protected" if protected else ""))
+    folder = out or Path("campaigns") / case.name
+    summaries = []
+    with executor_of(workers, dask) as pool:
+        for one in levels:
+            campaign = Campaign(case, one, runs, seed, random_starts)
+            with progress_bar(f"{case.name} at {one:g}", runs, as_json, unit="runs") as progress:
+                reported = Reported(progress)
+                started = time.perf_counter()
+                try:
+                    fly_campaign(campaign, folder, pool, reported)
+                except KeyboardInterrupt:
+                    print_interrupted(reported.last, runs)
+                    raise typer.Exit(130) from None
+                wall = time.perf_counter() - started
+            summary = summarize_campaign(campaign, folder)
+            steps = summary["flown_s"] / STEP * (1 - (reported.first or 0) / runs)
+            summary |= {"trial_steps_per_second": steps / wall, "wall_s": wall}
+            summaries.append(summary | {"out": str(folder)})
+    if as_json:
+        print_json(summaries[0] if len(summaries) == 1 else {"levels": summaries})
+        return
+    for summary in summaries:
+        _show(summary)
+
+
+class Reported:
+    """Passes progress on, and knows the first and the last of it."""
+
+    def __init__(self, progress: Callable[[int], None]):
+        self._progress = progress
+        self.first: int | None = None
+        self.last = 0
+
+    def __call__(self, done: int) -> None:
+        """Take the number of runs done so far."""
+        self.first = done if self.first is None else self.first
+        self.last = done
+        self._progress(done)
+
+
+def print_interrupted(done: int, runs: int) -> None:
+    """Say what an interrupted campaign keeps."""
+    print(
+        f"ahv: interrupted after {done} of {runs} runs; the same command resumes", file=sys.stderr
+    )
+
+
+def _show(summary: dict[str, Any]) -> None:
+    low, high = summary["interval"]
+    failures = ", ".join(
+        f"{cause.replace('_', ' ')} {count}" for cause, count in summary["failures"].items()
+    )
+    rows = [
+        ("success", f"{summary['successes']} of {summary['runs']}: {summary['success_rate']:.2%}"),
+        ("95 % interval", f"{low:.2%} to {high:.2%}"),
+        ("failures", failures or "none"),
+        (
+            "trim within 5 deg",
+            f"{summary['trim_within_5_deg']} vehicles have one at the commanded altitude;"
+            f" {summary['failures_without_such_trim']} of the failed have none",
+        ),
+        ("pace", f"{summary['trial_steps_per_second']:.3g} steps/s, {summary['wall_s']:.1f} s"),
+        ("kept in", summary["out"]),
+    ]
+    show_table(f"{summary['controller']} at {summary['level']:g}", rows)
+
+
+@monte_carlo.command()
+@one_sentence
+def rerun(
+    folder: Annotated[Path, typer.Argument(help="Folder of a campaign.")],
+    run: Annotated[int, typer.Argument(help="Number of the run.")],
+    level: Annotated[float | None, typer.Option(help="Level, if there are several.")] = None,
+    graph: Annotated[bool, typer.Option("--graph", help="Fly it on the ROS graph.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for a bag of the run.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly one run of a campaign again, alone, and compare it with what the campaign found."""
+    import numpy as np
+
+    from ahv_analysis.campaign.batch import fly_alone
+    from ahv_analysis.campaign.campaign import find_run, flight_columns, open_campaign
+    from ahv_analysis.flight.library import fly_library
+    from ahv_analysis.flight.outcome import Cause
+
+    campaign = open_campaign(folder, level)
+    row = find_run(campaign, folder, run)
+    if row is None:
+        raise UsageError(f"run {run} is not in {folder}, whose last run is {campaign.runs - 1}")
+    case = campaign.case_of(run)
+    tally = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
+    alone = flight_columns(
+        np.array([run]),
+        np.array([case.plant.truth.dispersion]),
+        np.array([case.plant.initial]),
+        np.array([tally]),
+    )
+    differing = [name for name in alone if alone[name][0] != row[name]]
+    result = {
+        "run": run,
+        "cause": Cause(int(tally.cause)).name.lower(),
+        "time_s": float(alone["time_s"][0]),
+        "max_abs_alpha_deg": float(alone["max_abs_alpha_deg"][0]),
+        "same_bits": not differing,
+        "differing": differing,
+    }
+    if graph or out is not None:
+        bag = (out or folder / f"run-{run}") / "bag"
+        if bag.exists():
+            raise UsageError(f"{bag} exists already: choose another --out")
+        with progress_bar(f"run {run}", case.plant.steps, as_json) as progress:
+            if graph:
+                check_domain()
+                from ahv_analysis.flight.one_process import fly_graph
+
+                ended_early, _ = fly_graph(case, bag, progress=progress)
+            else:
+                ended_early, _ = fly_library(case, bag, progress=progress)
+        result |= {"bag": str(bag), "ended_early": ended_early}
+    if as_json:
+        print_json(result)
+    else:
+        show_table(f"run {run} again", [(name, str(value)) for name, value in result.items()])
+
+
+@one_sentence
+def table(
+    runs: Annotated[
+        int | None, integer_option("Trials a cell, instead of the report's numbers.", 1)
+    ] = None,
+    seed: Seed = 0,
+    protected: Annotated[
+        bool, typer.Option("--protected", help="With angle-of-attack protection.")
+    ] = False,
+    workers: Workers = CORES,
+    dask: Dask = None,
+    out: Annotated[Path, typer.Option(help="Folder for campaigns and table.")] = Path(
+        "campaigns/table"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Fly Table 5.1 of the report and print it beside the report's counts."""
+    from ahv_analysis.campaign.table import fly_table, markdown, total_runs
+
+    started = time.perf_counter()
+    total = total_runs(runs)
+    with (
+        executor_of(workers, dask) as pool,
+        progress_bar("Table 5.1", total, as_json, unit="runs") as progress,
+    ):
+        try:
+            rows = fly_table(out, pool, seed, runs, protected, progress)
+        except KeyboardInterrupt:
+            print("ahv: interrupted; the same command resumes", file=sys.stderr)
+            raise typer.Exit(130) from None
+    name = "table_protected" if protected else "table"
+    text = markdown(rows)
+    (out / f"{name}.md").write_text(text)
+    content = {
+        "wall_s": time.perf_counter() - started,
+        "rows": [row.flown | {"against_report": row.verdict} for row in rows],
+    }
+    (out / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    if as_json:
+        print_json(content)
+    else:
+        print(text)
+        print(f"{total} flights in {content['wall_s']:.0f} s; kept in {out}")

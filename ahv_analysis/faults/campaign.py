@@ -1,0 +1,361 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Faults injected into flights in real time, one process per node, and what became of them."""
+
+import json
+import math
+import signal
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from random import Random
+from typing import Any, NamedTuple
+
+from std_msgs.msg import String
+
+from ahv_analysis.bag.reader import load_bag
+from ahv_analysis.bag.recovery import recover
+from ahv_analysis.errors import GraphError
+from ahv_analysis.faults.faulty_node import INJECT
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.process_per_node import (
+    LONGEST_START,
+    ProcessGraph,
+    Watcher,
+    set_transport,
+)
+from ahv_msgs_py.node.base_node import message_class, quality
+from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.topics import (
+    DISTURBANCE_ESTIMATE,
+    LEARNER,
+    LOOP_TOPICS,
+    RATE_COMMAND,
+    STATE,
+    SURFACE_COMMAND,
+    THROTTLE_COMMAND,
+    LoopTopic,
+)
+from ahv_plant.model.constants import DEGREES, STEP_NS, UNSTART_ALPHA
+from ahv_plant.model.vectors import State
+
+CASE = "neuro_adaptive_sc_gdi"
+LEAD = 2.0  # [s] of undisturbed flight
+LONGEST_OUTAGE = 1.0  # [s] of a node
+LONGEST_LOSS = 0.5  # [s] of a bag whose recorder was killed
+SETTLE = 1.0  # [s] after an injection, in which it must be noticed
+PER_FLIGHT = 75  # injections, so that a flight stays within its 150 s
+NODES = ("outer_intermediate", "disturbance_learner", "inner_loop", "velocity")
+RECEIVED = (STATE, RATE_COMMAND, LEARNER, DISTURBANCE_ESTIMATE, SURFACE_COMMAND, THROTTLE_COMMAND)
+COMMANDS = (RATE_COMMAND, LEARNER, DISTURBANCE_ESTIMATE, SURFACE_COMMAND, THROTTLE_COMMAND)
+# What somebody must report, any one of them, by the kind of the injection.
+EXPECTED = {
+    "killed": {Fault.INPUT_MISSING, Fault.LATE, Fault.COMMAND_LOST},
+    "stopped": {Fault.INPUT_MISSING, Fault.LATE, Fault.COMMAND_LOST, Fault.TICK_MISSED},
+    "silent": {Fault.INPUT_MISSING, Fault.LATE},
+    "nan": {Fault.NOT_FINITE},
+    "infinity": {Fault.NOT_FINITE},
+    "out of range": {Fault.OUT_OF_RANGE},
+    "wrong names": {Fault.MALFORMED},
+    "cut short": {Fault.MALFORMED},
+    "garbage": {Fault.MALFORMED},
+    "twice": {Fault.DUPLICATE},
+    "out of order": {Fault.OUT_OF_ORDER},
+    "stale": {Fault.STALE, Fault.OUT_OF_ORDER},
+    "ahead": {Fault.WRONG_STAMP},
+    "off the grid": {Fault.WRONG_STAMP},
+    "wild": {Fault.SURFACES_SATURATED, Fault.NEWTON_LIMIT, Fault.NEWTON_SINGULAR},
+    "second publisher": {Fault.SECOND_PUBLISHER},
+}
+
+
+class Injection(NamedTuple):
+    """One fault, as it was injected and what was seen of it."""
+
+    kind: str
+    target: str  # a node or a topic
+    time: float  # [s] of the flight
+    length: float  # [s] that it lasted
+    noticed: str  # the first report that was expected, by whom; empty if there was none
+    latency: float | None  # [s] of simulated time until then
+    max_abs_alpha: float  # [deg] until the next one
+
+
+def draw_injections(random: Random, count: int) -> Iterator[tuple[str, str, float]]:
+    """Kind, target and length [s]; every kind comes up about equally often, none is left out."""
+    plans: list[tuple[str, tuple[str, ...]]] = [("killed", NODES), ("stopped", (*NODES, "plant"))]
+    received = tuple(topic.name for topic in RECEIVED)
+    commands = tuple(topic.name for topic in COMMANDS)
+    for kind in EXPECTED:
+        if kind == "wild":
+            plans.append((kind, (RATE_COMMAND.name,)))
+        elif kind == "out of range":
+            plans.append((kind, (SURFACE_COMMAND.name, THROTTLE_COMMAND.name)))
+        elif kind in ("ahead", "stale", "silent", "second publisher"):
+            plans.append((kind, commands))
+        elif kind not in ("killed", "stopped"):
+            plans.append((kind, received))
+    queue: list[tuple[str, tuple[str, ...]]] = []
+    for _ in range(count):
+        if not queue:
+            queue = random.sample(plans, len(plans))
+        kind, targets = queue.pop()
+        longest = {"killed": LONGEST_OUTAGE, "stopped": LONGEST_OUTAGE, "wild": 0.02}
+        yield kind, random.choice(targets), random.uniform(0.01, longest.get(kind, 0.3))
+
+
+class Spectator(Watcher):
+    """Sees the states, and can speak where it should not."""
+
+    def __init__(self) -> None:
+        """Listen to the state as well."""
+        super().__init__()
+        message_type = message_class(STATE.layout.type_name)
+        self._node.create_subscription(
+            message_type, STATE.name, self._see, quality(durable=False, depth=10), raw=True
+        )
+        self._orders = self._node.create_publisher(String, INJECT, quality(durable=False))
+        self._voices: dict[str, Any] = {}
+        self._speaking: LoopTopic | None = None
+        self.state: State | None = None
+        self.stamp = 0  # [ns]
+        self.max_abs_alpha = 0.0  # [rad] since it was last reset
+
+    def _see(self, data: bytes) -> None:
+        known = STATE.layout.decode(data)
+        if known is None or not math.isfinite(sum(known[1])):
+            return  # one of the wrong ones
+        self.stamp, self.state = known[0], State(*known[1])
+        alpha = abs(math.atan2(self.state.w, self.state.u))
+        self.max_abs_alpha = max(self.max_abs_alpha, alpha)
+        if self._speaking is not None:
+            topic = self._speaking
+            values = [0.3] * len(topic.layout.fields)  # plausible, and wrong
+            self._voices[topic.name].publish(topic.layout.encode(self.stamp, values))
+
+    def order(self, topic: str, kind: str, count: int) -> None:
+        """Tell the node that publishes a topic to fail."""
+        text = json.dumps({"topic": topic, "kind": kind, "count": count})
+        self._orders.publish(String(data=text))
+
+    def speak(self, topic: LoopTopic, seconds: float) -> None:
+        """Publish commands of one's own on a topic that has its publisher."""
+        if topic.name not in self._voices:
+            self._voices[topic.name] = self._node.create_publisher(
+                message_class(topic.layout.type_name), topic.name, quality(durable=False, depth=10)
+            )
+            self.look(0.2)  # until it is heard
+        self._speaking = topic
+        self.look(seconds)
+        self._speaking = None
+
+
+def run_campaign(
+    injections: int, seed: int, out: Path, progress: Callable[[int], None] = lambda done: None
+) -> dict[str, Any]:
+    """Fly and disturb until so many faults were injected; bags and `faults.json` go to `out`."""
+    random = Random(seed)
+    done: list[Injection] = []
+    flights: list[dict[str, Any]] = []
+    out.mkdir(parents=True, exist_ok=True)
+    while len(done) < injections:
+        count = min(PER_FLIGHT, injections - len(done))
+        bag = out / f"bag-{len(flights)}"
+        before = len(done)
+        flight = _disturbed_flight(
+            list(draw_injections(random, count)),
+            bag,
+            done,
+            lambda: progress(len(done)),
+        )
+        flights.append(flight | _judge_bag(bag, done[before:]))
+    flights.append(_bereaved_flight(out / "bag-of-a-killed-recorder", done))
+    report = _report(done, flights, seed)
+    (out / "faults.json").write_text(json.dumps(report, indent=1, allow_nan=False) + "\n")
+    return report
+
+
+def _disturbed_flight(
+    plan: list[tuple[str, str, float]],
+    bag: Path,
+    done: list[Injection],
+    progress: Callable[[], None],
+) -> dict[str, Any]:
+    """One flight with the injections of a plan."""
+    set_transport(realtime=True)
+    spectator = Spectator()
+    unexpected: list[str] = []
+    try:
+        case = load_case(CASE, {"duration": 3600.0})
+        with ProcessGraph(case, bag, realtime=True, spectators=1, can_fail=True) as graph:
+            _wait_for_flight(spectator)
+            spectator.look(LEAD)
+            for kind, target, length in plan:
+                done.append(_inject(spectator, graph, kind, target, length))
+                unexpected += [f"{name}: {code}" for name, code in graph.ended().items()]
+                progress()
+            graph.end_flight()
+    finally:
+        spectator.close()
+    return {"steps": spectator.stamp // STEP_NS, "unexpected_ends": unexpected}
+
+
+def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
+    """One flight that loses its recorder, and then its plant, and gets a new one."""
+    set_transport(realtime=True)
+    spectator = Spectator()
+    try:
+        case = load_case(CASE, {"duration": 3600.0})
+        with ProcessGraph(case, bag, realtime=True, spectators=1) as graph:
+            _wait_for_flight(spectator)
+            spectator.look(LEAD)
+            killed = spectator.stamp
+            graph.kill("recorder")
+            spectator.look(SETTLE)
+            went_on = spectator.stamp - killed
+            alpha = spectator.max_abs_alpha * DEGREES
+            goes_on = "the flight goes on" if went_on > 0.5 * SETTLE * 1e9 else ""
+            done.append(
+                Injection("recorder killed", "recorder", killed * 1e-9, 0.0, goes_on, 0.0, alpha)
+            )
+
+            start, seen = spectator.stamp, len(spectator.statuses)
+            spectator.max_abs_alpha = 0.0
+            graph.kill("plant")
+            spectator.look(2.0)
+            lost = {
+                node for _, node, _, text, _ in spectator.statuses[seen:] if "state lost" in text
+            }
+            graph.values["plant"] |= {"listeners": len(graph.controllers) + 1}  # no recorder
+            graph.start("plant")
+            spectator.look(5.0)
+            restarted = 1e9 < spectator.stamp != start and spectator.max_abs_alpha > 0.0
+            noticed = "all controllers: state lost" if lost >= {*NODES} and restarted else ""
+            alpha = spectator.max_abs_alpha * DEGREES
+            done.append(Injection("plant killed", "plant", start * 1e-9, 2.0, noticed, 1.5, alpha))
+            graph.end_flight()
+    finally:
+        spectator.close()
+    recovered = bag.with_name(bag.name + "-recovered")
+    recover(bag, recovered)
+    stamps = [
+        known[0]
+        for data in load_bag(recovered).topics[STATE.name].messages
+        if (known := STATE.layout.decode(data)) is not None
+    ]
+    return {
+        "steps": killed // STEP_NS,
+        "unexpected_ends": [],
+        "not_finite": {},
+        "states_missing_in_bag": 0,
+        "lost_with_the_recorder_s": max(0.0, (killed - max(stamps)) * 1e-9),
+    }
+
+
+def _wait_for_flight(spectator: Spectator) -> None:
+    for _ in range(int(LONGEST_START / 0.1)):
+        spectator.look(0.1)
+        if spectator.state is not None:
+            return
+    raise GraphError(f"no flight after {LONGEST_START:g} s")
+
+
+def _inject(
+    spectator: Spectator, graph: ProcessGraph, kind: str, target: str, length: float
+) -> Injection:
+    """Inject one fault and see what becomes of it."""
+    spectator.max_abs_alpha = 0.0
+    seen = len(spectator.statuses)
+    start = spectator.stamp
+    if kind == "killed":
+        graph.kill(target)
+        spectator.look(length)
+        graph.start(target)
+        spectator.look(1.0)
+    elif kind == "stopped":
+        length = max(length, 0.05)
+        graph.signal(target, signal.SIGSTOP)
+        spectator.look(length)
+        graph.signal(target, signal.SIGCONT)
+    elif kind == "second publisher":
+        topic = next(topic for topic in LOOP_TOPICS if topic.name == target)
+        spectator.speak(topic, length)
+    else:
+        spectator.order(target, kind, max(1, round(length * 1e9 / STEP_NS)))
+        spectator.look(length)
+    spectator.look(SETTLE)
+    noticed, latency = "", None
+    names = {fault.name.lower().replace("_", " ") for fault in EXPECTED[kind]}
+    for stamp, node, _, text, _ in spectator.statuses[seen:]:
+        if any(text.startswith(f"{name}:") for name in names):
+            noticed, latency = f"{node}: {text.partition(':')[0]}", (stamp - start) * 1e-9
+            break
+    return Injection(
+        kind,
+        target,
+        start * 1e-9,
+        length,
+        noticed,
+        latency,
+        spectator.max_abs_alpha * DEGREES,
+    )
+
+
+def _judge_bag(bag: Path, injected: list[Injection]) -> dict[str, Any]:
+    """Whether the bag holds every state, and numbers that are not finite beyond the injected."""
+    wrong = {entry.target for entry in injected if entry.kind in ("nan", "infinity")}
+    stamps: set[int] = set()
+    spoilt = 0  # states that were sent wrongly, and are in the bag as they were sent
+    not_finite: Counter[str] = Counter()
+    recorded = load_bag(bag).topics
+    for topic in LOOP_TOPICS:
+        for data in recorded[topic.name].messages:
+            known = topic.layout.decode(data)
+            if known is None or known[0] % STEP_NS:
+                spoilt += topic is STATE
+                continue
+            if not math.isfinite(sum(known[1])) and topic.name not in wrong:
+                not_finite[topic.name] += 1
+            if topic is STATE:
+                stamps.add(known[0] // STEP_NS)
+    last = max(stamps)
+    return {
+        "not_finite": dict(not_finite),
+        "states_missing_in_bag": max(0, len(set(range(last + 1)) - stamps) - spoilt),
+    }
+
+
+def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> dict[str, Any]:
+    """Everything, and the verdict."""
+    alpha = max(entry.max_abs_alpha for entry in done)
+    kinds = {}
+    for kind in dict.fromkeys(entry.kind for entry in done):
+        of_kind = [entry for entry in done if entry.kind == kind]
+        if of_kind:
+            latencies = [entry.latency for entry in of_kind if entry.latency is not None]
+            kinds[kind] = {
+                "injected": len(of_kind),
+                "noticed": len(latencies),
+                "latency_s_max": max(latencies, default=None),
+                "max_abs_alpha_deg": max(entry.max_abs_alpha for entry in of_kind),
+            }
+    unnoticed = [entry._asdict() for entry in done if not entry.noticed]
+    passed = (
+        alpha <= UNSTART_ALPHA * DEGREES
+        and not unnoticed
+        and all(flight.get("lost_with_the_recorder_s", 0.0) < LONGEST_LOSS for flight in flights)
+        and all(
+            not (flight["unexpected_ends"] or flight["not_finite"])
+            and flight["states_missing_in_bag"] == 0
+            for flight in flights
+        )
+    )
+    return {
+        "seed": seed,
+        "injections": len(done),
+        "passed": passed,
+        "max_abs_alpha_deg": alpha,
+        "unnoticed": unnoticed,
+        "kinds": kinds,
+        "flights": flights,
+        "log": [entry._asdict() for entry in done],
+    }

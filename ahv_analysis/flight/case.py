@@ -1,0 +1,190 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Case files: a flight's settings as a ROS parameter file, read and checked without ROS.
+
+The same file sets up a flight here and a node by `--ros-args --params-file`.
+"""
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from ahv_analysis.versions import versions
+from ahv_control.flight_control import FlightControl
+from ahv_control.parameters import (
+    INNER_LOOP_PARAMETERS,
+    LEARNER_PARAMETERS,
+    OUTER_INTERMEDIATE_PARAMETERS,
+    VELOCITY_PARAMETERS,
+    inner_loop,
+    intermediate_loop,
+    learner_settings,
+    outer_loop,
+    velocity_loop,
+)
+from ahv_msgs_py.parameters import SHARED, ParameterError, Value, check_parameters
+from ahv_msgs_py.topics import NAMESPACE
+from ahv_plant.dispersion import Dispersion
+from ahv_plant.parameters import PLANT_PARAMETERS, PlantSettings, plant_settings
+
+EVERY_NODE = "/**"
+NODES = {
+    "plant": PLANT_PARAMETERS,
+    "outer_intermediate": OUTER_INTERMEDIATE_PARAMETERS,
+    "disturbance_learner": LEARNER_PARAMETERS,
+    "inner_loop": INNER_LOOP_PARAMETERS,
+    "velocity": VELOCITY_PARAMETERS,
+}
+
+
+class Draw(NamedTuple):
+    """Where a drawn vehicle comes from: it can be drawn again, with the same bits."""
+
+    level: float  # [-]
+    seed: int  # of the campaign
+    run: int
+    random_start: bool = False  # the start is drawn as well
+
+
+class Case(NamedTuple):
+    """A flight as it is set up."""
+
+    name: str
+    parameters: dict[str, dict[str, Value]]  # of every node, complete and checked
+    plant: PlantSettings
+    control: FlightControl
+    draw: Draw | None = None  # of the dispersion among the parameters, if it was drawn
+
+
+def notes(case: Case) -> str:
+    """What to file with the bag of a flight, as JSON: case, parameters, draw and versions."""
+    content = {"case": case.name, "parameters": case.parameters, "versions": versions()}
+    if case.draw is not None:
+        content["draw"] = case.draw._asdict()
+    return json.dumps(content)
+
+
+def config_folder() -> Path:
+    """Folder `config` of the source tree, or of the installation."""
+    source = Path(__file__).resolve().parents[2]
+    if (source / "package.xml").exists():
+        return source / "config"
+    # setuptools installs into <prefix>/lib/pythonX.Y/site-packages, and data into <prefix>/share
+    for prefix in (*source.parents, Path(sys.prefix)):
+        if (prefix / "share" / "ahv" / "config").is_dir():
+            return prefix / "share" / "ahv" / "config"
+    raise FileNotFoundError("the configuration of ahv is not installed beside its code")
+
+
+def case_names() -> list[str]:
+    """Cases that come with the package."""
+    return sorted(path.stem for path in (config_folder() / "cases").glob("*.yaml"))
+
+
+def load_case(
+    name: str, plant: Mapping[str, object] | None = None, draw: Draw | None = None
+) -> Case:
+    """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
+
+    `plant` replaces parameters of the plant: a dispersion, another start or duration; `draw` says
+    where the dispersion comes from, if it was drawn.
+    """
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml"):
+        path = config_folder() / "cases" / f"{name}.yaml"
+    if not path.is_file():
+        raise ParameterError(
+            f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
+        )
+    given = _read(path)
+    given["plant"] |= plant or {}
+    return make_case(path.stem, given, draw)
+
+
+def dispersion_parameters(dispersion: Dispersion) -> dict[str, object]:
+    """Plant parameters of a dispersion."""
+    return {f"dispersion.{name}": value for name, value in dispersion._asdict().items()}
+
+
+def load_dispersion(path: Path) -> dict[str, object]:
+    """Plant parameters of a dispersion file: a ROS parameter file with the plant alone."""
+    given = _read(path)
+    for node, values in given.items():
+        for name in values:
+            if node != "plant" or not name.startswith(("dispersion.", "disturbance.")):
+                raise ParameterError(
+                    f"{path.name}: {node}: {name} has no place in a dispersion file; "
+                    "valid are the plant's dispersion and disturbance"
+                )
+    return given["plant"]
+
+
+def make_case(
+    name: str, given: Mapping[str, Mapping[str, object]], draw: Draw | None = None
+) -> Case:
+    """Case of the parameters `given` for each node; ParameterError names what is wrong."""
+    parameters = {
+        node: check_parameters(f"{name}: {node}", known, given[node])
+        for node, known in NODES.items()
+    }
+    adaptive = parameters["inner_loop"]["adaptive"]
+    control = FlightControl(
+        outer_loop(parameters["outer_intermediate"]),
+        intermediate_loop(parameters["outer_intermediate"]),
+        inner_loop(parameters["inner_loop"]),
+        velocity_loop(parameters["velocity"]),
+        learner_settings(parameters["disturbance_learner"]) if adaptive else None,
+    )
+    return Case(name, parameters, plant_settings(parameters["plant"]), control, draw)
+
+
+def _read(path: Path) -> dict[str, dict[str, object]]:
+    """Parameters per node as the file gives them, those of `/**` given to all that know them."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+        reason = " ".join(str(error).split())
+        raise ParameterError(f"{path.name}: not a readable YAML file: {reason}") from error
+    sections: dict[str, dict[str, object]] = {}
+    valid = [EVERY_NODE] + [f"{NAMESPACE}/{node}" for node in NODES]
+    if not isinstance(content, dict):
+        raise ParameterError(f"{path.name}: must have sections {', '.join(valid)}")
+    for section, body in content.items():
+        if section not in valid:
+            raise ParameterError(
+                f"{path.name}: there is no node {section!r}; valid are {', '.join(valid)}"
+            )
+        if not isinstance(body, dict) or not isinstance(body.get("ros__parameters"), dict):
+            raise ParameterError(f"{path.name}: {section} must hold a section ros__parameters")
+        sections[section] = _flat(body["ros__parameters"])
+    shared = sections.get(EVERY_NODE, {})
+    for name in shared:
+        if name not in SHARED:
+            raise ParameterError(
+                f"{path.name}: {EVERY_NODE}: {name!r} is not one of {', '.join(SHARED)}"
+            )
+    for section, body in sections.items():
+        twice = sorted(shared.keys() & body.keys()) if section != EVERY_NODE else []
+        if twice:
+            raise ParameterError(
+                f"{path.name}: {twice[0]} stands in {EVERY_NODE} and in {section}; once is enough"
+            )
+    return {
+        node: {name: shared[name] for name in shared if name in {p.name for p in known}}
+        | sections.get(f"{NAMESPACE}/{node}", {})
+        for node, known in NODES.items()
+    }
+
+
+def _flat(tree: dict[str, object], prefix: str = "") -> dict[str, object]:
+    """Nested sections as dotted names, as ROS has them."""
+    flat: dict[str, object] = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat

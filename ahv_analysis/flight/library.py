@@ -1,0 +1,115 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A flight in this process, without ROS: the same laws and vehicle, composed the same way."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ahv_analysis.bag.writer import BagWriter
+from ahv_analysis.flight.case import Case, notes
+from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
+from ahv_control.flight_control import (
+    NEUTRAL,
+    Commands,
+    adaptive_control,
+    first_learner,
+    next_adaptive_control,
+    nominal_control,
+)
+from ahv_control.intermediate_loop import Rates
+from ahv_control.learner_message import estimate_values, learner_values
+from ahv_msgs_py.layout import clock_bytes
+from ahv_msgs_py.topics import (
+    ATTITUDE_COMMAND,
+    CLOCK,
+    DISTURBANCE_ESTIMATE,
+    LEARNER,
+    RATE_COMMAND,
+    STATE,
+    SURFACE_COMMAND,
+    THROTTLE_COMMAND,
+    LoopTopic,
+)
+from ahv_plant.model.constants import STEP, STEP_NS
+from ahv_plant.model.vectors import State
+from ahv_plant.termination import departure_reason
+from ahv_plant.vehicle import vehicle_step
+
+CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
+
+
+class Step(NamedTuple):
+    """One step of a flight: the state and what the flight control answers."""
+
+    stamp: int  # [ns]
+    state: State
+    commands: Commands
+    learner: LearnerState | None
+    ended_early: str  # why this is the last step before its time; empty if it is not
+
+
+def fly(case: Case) -> Iterator[Step]:
+    """Fly `case`: its steps 0 to N, or fewer if the vehicle departs from the model."""
+    state, truth, control = case.plant.initial, case.plant.truth, case.control
+    learner = None if control.learner is None else first_learner(state, control.learner)
+    if learner is None:
+        commands = nominal_control(state, NEUTRAL, control)
+    else:
+        commands = adaptive_control(state, learner, NEUTRAL, control)
+    for step in range(case.plant.steps):
+        later = State(
+            *vehicle_step(state, commands.surfaces, commands.throttle, step * STEP, truth)
+        )
+        reason = departure_reason(later, truth.geometric, (step + 1) * STEP)
+        yield Step(step * STEP_NS, state, commands, learner, reason)
+        if reason:
+            return
+        if learner is None:
+            commands = nominal_control(later, commands.surfaces, control)
+        else:
+            learner, commands = next_adaptive_control(learner, state, commands, later, control)
+        state = later
+    yield Step(case.plant.steps * STEP_NS, state, commands, learner, "")
+
+
+def fly_library(
+    case: Case, path: Path, *, progress: Callable[[int], None] = lambda steps: None
+) -> tuple[str, float]:
+    """Fly `case` and record it to the bag `path`, as `fly_graph` does.
+
+    `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did
+    not) and the seconds that it took.
+    """
+    bag = BagWriter(path, notes(case))
+    started = time.perf_counter()
+    try:
+        for step in fly(case):
+            write_step(bag, step)
+            if (step.stamp + STEP_NS) % CHUNK == 0:
+                bag.flush()
+                progress(step.stamp // STEP_NS)
+    finally:
+        bag.close()  # whole up to here, even if the flight is interrupted
+    wall = time.perf_counter() - started
+    return step.ended_early, wall
+
+
+def write_step(bag: BagWriter, step: Step) -> None:
+    """File a step as the recorder files the messages of the graph."""
+    answers = step.commands
+    bag.write(CLOCK.name, clock_bytes(step.stamp))
+    messages: list[tuple[LoopTopic, Sequence[float]]] = [
+        (STATE, step.state),
+        (ATTITUDE_COMMAND, answers.attitude),
+        (RATE_COMMAND, answers.rates),
+        (SURFACE_COMMAND, answers.surfaces),
+        (THROTTLE_COMMAND, (answers.throttle,)),
+    ]
+    if step.learner is not None:
+        rates = Rates(step.state.P, step.state.Q, step.state.R)
+        estimate = disturbance_estimate(step.learner, rates)
+        messages.append((LEARNER, learner_values(step.learner)))
+        messages.append((DISTURBANCE_ESTIMATE, estimate_values(estimate)))
+    for topic, values in messages:
+        bag.write(topic.name, topic.layout.encode(step.stamp, values))

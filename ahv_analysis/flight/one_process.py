@@ -1,0 +1,139 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A flight on the ROS graph, all nodes in this process, in lockstep."""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.experimental import EventsExecutor
+from rclpy.task import Future
+
+from ahv_analysis.bag.recorder_node import STOP, RecorderNode
+from ahv_analysis.errors import GraphError
+from ahv_analysis.flight.case import Case, notes
+from ahv_analysis.flight.library import fly
+from ahv_analysis.flight.process_per_node import controllers, node_class
+from ahv_msgs_py.node.base_node import REALTIME, BaseNode
+from ahv_msgs_py.node.process import DISCOVERY_RANGE
+from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
+from ahv_plant.plant_node import PlantNode
+
+LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
+LOOK = 0.2  # [s] of wall time between looks at the progress
+
+
+def loop_topics(case: Case) -> Sequence[LoopTopic]:
+    """Topics of the control loop of a case."""
+    return LOOP_TOPICS if case.control.learner else NOMINAL_TOPICS
+
+
+def fly_graph(
+    case: Case,
+    bag: Path | None,
+    *,
+    domain: int | None = None,
+    realtime: bool = False,
+    on_error: str = STOP,
+    progress: Callable[[int], None] = lambda steps: None,
+) -> tuple[str, float]:
+    """Fly `case` on a graph of its own context; record to `bag` unless that is None.
+
+    In lockstep, or with `realtime` at 100 Hz by the wall clock. `progress(steps)` is called now
+    and then. Returns why the flight ended early (empty if it did not) and the seconds from the
+    first state to the last command. Raises ParameterError for settings that a node refuses,
+    GraphError if the graph stops and BagError if the disk fails; with `on_error` CONTINUE the
+    flight goes on without a record then.
+    """
+    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    executor = EventsExecutor(context=context)
+    nodes: list[BaseNode] = []
+    recorder = None
+    mode = {REALTIME.name: realtime}
+    try:
+        if bag is not None:
+            settings = {"bag": str(bag), "notes": notes(case), "on_error": on_error} | mode
+            recorder = RecorderNode(settings, context)
+            nodes.append(recorder)
+        nodes += [
+            node_class(name)(case.parameters[name] | mode, context) for name in controllers(case)
+        ]
+        listeners = len(nodes)
+        plant = PlantNode(case.parameters["plant"] | mode | {"listeners": listeners}, context)
+        nodes.append(plant)
+        for _ in zip(range(2), fly(case), strict=False):
+            pass  # compile the laws before the clock runs
+        for node in nodes:
+            node.bring_up()
+            executor.add_node(node)
+        started = time.perf_counter()
+        _spin(executor, plant, recorder, progress)
+        wall = time.perf_counter() - started
+        if plant.count_publishers(STATE.name) > 1:
+            raise GraphError(
+                "another plant flew in the same ROS domain: set ROS_DOMAIN_ID to one of your own"
+            )
+        if recorder is not None:
+            _drain(executor, recorder, loop_topics(case), plant.step)
+    finally:
+        for node in nodes:
+            executor.remove_node(node)
+        executor.shutdown()
+        for node in reversed(nodes):
+            node.destroy_node()
+        rclpy.shutdown(context=context)
+    if recorder is not None and recorder.failure is not None and on_error == STOP:
+        raise recorder.failure
+    return plant.finished.result(), wall
+
+
+def _spin(
+    executor: EventsExecutor,
+    plant: PlantNode,
+    recorder: RecorderNode | None,
+    progress: Callable[[int], None],
+) -> None:
+    """Run the graph until the flight is over, or until the recorder gives it up.
+
+    The executor looks at the time only when nothing waits for it: in lockstep hardly ever. So
+    progress comes by a timer, and the end by a future.
+    """
+    over = Future(executor=None)
+    for node in (plant, recorder):
+        if node is not None:
+            node.finished.add_done_callback(lambda _: over.done() or over.set_result(None))
+    steady = Clock(clock_type=ClockType.STEADY_TIME)
+    plant.create_timer(LOOK, lambda: progress(plant.step), clock=steady)
+    last, since = -1, time.monotonic()
+    while not over.done():
+        executor.spin_until_future_complete(over, LOOK)
+        if plant.step != last:
+            last, since = plant.step, time.monotonic()
+        elif time.monotonic() - since > LONGEST_SILENCE:
+            raise GraphError(
+                f"the graph stopped at step {plant.step}: no answer for {LONGEST_SILENCE:g} s"
+            )
+    if recorder is not None and recorder.failure is not None and recorder.finished.done():
+        raise recorder.failure
+    progress(plant.step)
+
+
+def _drain(
+    executor: EventsExecutor, recorder: RecorderNode, topics: Sequence[LoopTopic], steps: int
+) -> None:
+    """Let the recorder take what is still under way."""
+    executor.spin_until_future_complete(recorder.finished, LONGEST_SILENCE)
+    if recorder.realtime or recorder.failure is not None:
+        return  # messages may be missing, and are counted
+    if not recorder.finished.done():
+        raise GraphError(f"the recorder missed {recorder.missing(topics, steps)} messages")
+    surplus = -recorder.balance(topics, steps)
+    if surplus:
+        raise GraphError(
+            f"the bag holds {surplus} messages of another flight: "
+            "set ROS_DOMAIN_ID to one of your own"
+        )

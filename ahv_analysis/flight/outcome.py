@@ -1,0 +1,103 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""What a flight of a campaign comes to, kept up step by step: verdict, cause, extremes.
+
+Element-wise, so that a run counts the same alone and in a lane.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from ahv_control.disturbance_learner import LearnerState
+from ahv_control.flight_control import Commands
+from ahv_plant.model.constants import UNSTART_ALPHA
+from ahv_plant.model.vectors import State
+from ahv_plant.numerics.elementary import atan_ratio
+from ahv_plant.numerics.elementwise import elementwise, select
+from ahv_plant.termination import departure
+
+
+class Cause(IntEnum):
+    """Why a run failed; the first that happened, and of several at once the first listed."""
+
+    SUCCESS = 0
+    STATE_IS_NOT_FINITE = 1
+    LEFT_THE_ATMOSPHERE_MODEL = 2
+    SURFACES_LOST_THE_VEHICLE = 3  # the Newton step met a singular Jacobian
+    INLET_UNSTART = 4  # |alpha| > 5 deg
+
+
+class Tally(NamedTuple):
+    """Of one run, up to its failure; angles in rad, in the order of a block's rows."""
+
+    cause: float  # a Cause
+    steps: float  # flown before the failure
+    max_abs_alpha: float
+    max_abs_beta: float
+    max_abs_rate: float  # [rad/s] of P, Q, R
+    max_abs_phi: float
+    min_surface: float
+    max_surface: float
+    min_throttle: float
+    max_throttle: float
+    max_altitude_error: float  # [m]
+    max_observer_error: float  # [rad/s] largest |X - X_a|; zero without a learner
+    final_altitude: float  # [m] last before the failure
+    final_speed: float  # [m/s]
+
+
+START = Tally(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@elementwise
+def observer_error(state: State, learner: LearnerState) -> float:
+    """Largest |X - X_a| [rad/s] of the three channels."""
+    X_a = learner.X_a
+    return max(abs(state.P - X_a.P), abs(state.Q - X_a.Q), abs(state.R - X_a.R))
+
+
+@elementwise
+def cause_now(state: State, status: int, geometric: bool) -> float:
+    """Cause for which a flight fails at a state whose surfaces were found with `status`."""
+    left = departure(state, geometric)
+    unstart = select(abs(atan_ratio(state.w, state.u)) > UNSTART_ALPHA, 4.0, 0.0)
+    lost = select(status == 3, 3.0, unstart)
+    outside = select(left == 2, 2.0, lost)
+    return select(left == 1, 1.0, outside)
+
+
+@elementwise
+def count_step(
+    tally: Tally, state: State, answer: Commands, observed: float, altitude: float, geometric: bool
+) -> Tally:
+    """Tally after one more state and its answer; once a run has failed nothing changes."""
+    alpha = abs(atan_ratio(state.w, state.u))
+    v = abs(state.v)
+    beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more
+    flying = tally.cause == 0.0
+    cause = select(flying, cause_now(state, answer.status, geometric), tally.cause)
+    counts = cause == 0.0
+    surfaces = answer.surfaces
+    least = -max(-surfaces.right_elevon, -surfaces.left_elevon, -surfaces.rudder)
+    most = max(surfaces.right_elevon, surfaces.left_elevon, surfaces.rudder)
+    rate = max(abs(state.P), abs(state.Q), abs(state.R))
+    return Tally(
+        cause,
+        tally.steps + select(counts, 1.0, 0.0),
+        # the failing state still counts for alpha, so that the margin tells of it
+        select(flying, max(tally.max_abs_alpha, alpha), tally.max_abs_alpha),
+        select(counts, max(tally.max_abs_beta, beta), tally.max_abs_beta),
+        select(counts, max(tally.max_abs_rate, rate), tally.max_abs_rate),
+        select(counts, max(tally.max_abs_phi, abs(state.phi)), tally.max_abs_phi),
+        select(counts, -max(-tally.min_surface, -least), tally.min_surface),
+        select(counts, max(tally.max_surface, most), tally.max_surface),
+        select(counts, -max(-tally.min_throttle, -answer.throttle), tally.min_throttle),
+        select(counts, max(tally.max_throttle, answer.throttle), tally.max_throttle),
+        select(
+            counts,
+            max(tally.max_altitude_error, abs(state.h - altitude)),
+            tally.max_altitude_error,
+        ),
+        select(counts, max(tally.max_observer_error, observed), tally.max_observer_error),
+        select(counts, state.h, tally.final_altitude),
+        select(counts, state.u, tally.final_speed),
+    )

@@ -1,0 +1,308 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A recorded flight fed to the controller nodes again, on a live graph.
+
+A feeder publishes the messages of the bag on their own topics, as the bytes they were recorded as,
+and every node answers as in flight. What the replayed nodes publish goes by ROS's remapping to
+topics under `/replay`: every node hears recorded inputs alone, and is thereby tested alone. Where
+the bag does not have a topic, as when an adaptive controller is tried on a nominal flight, the
+replayed node's own messages take its place.
+
+Nodes are in lockstep, also at a chosen rate: they wait for inputs of one stamp, so that neither
+the order of messages nor the clock changes what they answer.
+"""
+
+import os
+import time
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import NamedTuple
+
+import rclpy
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.task import Future
+
+from ahv_analysis.errors import BagError, GraphError
+from ahv_analysis.flight.case import Case
+from ahv_analysis.flight.process_per_node import node_class
+from ahv_analysis.replay.inputs import LEARNER_NODE, Change, Recording
+from ahv_analysis.replay.result import Comparison, compare
+from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.node.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.process import DISCOVERY_RANGE
+from ahv_msgs_py.node.synchronizer import Values
+from ahv_msgs_py.parameters import ParameterError
+from ahv_msgs_py.topics import (
+    ATTITUDE_COMMAND,
+    DIAGNOSTICS,
+    DISTURBANCE_ESTIMATE,
+    LEARNER,
+    LEARNER_TOPICS,
+    LOOP_TOPICS,
+    RATE_COMMAND,
+    STATE,
+    SURFACE_COMMAND,
+    THROTTLE_COMMAND,
+    LoopTopic,
+)
+from ahv_plant.model.constants import STEP_NS
+
+ANSWERS = {
+    "outer_intermediate": (ATTITUDE_COMMAND, RATE_COMMAND),
+    LEARNER_NODE: (LEARNER, DISTURBANCE_ESTIMATE),
+    "inner_loop": (SURFACE_COMMAND,),
+    "velocity": (THROTTLE_COMMAND,),
+}
+REPLAYED = "/replay"  # before the names of the topics of replayed nodes
+BATCH = 100  # steps that are fed before the answers are waited for
+LISTEN = 1.0  # [s] for other graphs, before anything is said where they could hear it
+LONGEST_SILENCE = 10.0  # [s] without an answer, after which the graph has failed
+LOOK = 0.2  # [s] between looks at the progress
+
+
+class Replay(NamedTuple):
+    """A flight as it was replayed."""
+
+    steps: list[int]  # [ns] stamps that were fed
+    answers: dict[LoopTopic, dict[int, Values]]  # what the nodes commanded, by stamp [ns]
+    comparisons: list[Comparison]  # of every topic of every node, with the bag
+    skipped: dict[str, int]  # steps of each node that lack inputs in the bag
+
+
+def replay(
+    recording: Recording,
+    case: Case,
+    names: Sequence[str],
+    *,
+    rate: float | None = None,
+    domain: int | None = None,
+    progress: Callable[[int], None] = lambda steps: None,
+) -> Replay:
+    """Feed a recording to the controllers `names` with the parameters of `case`.
+
+    As fast as the nodes answer, on a graph that nobody else hears; or `rate` times real time, to
+    be watched, in a ROS domain where nobody flies. `progress(steps)` is called now and then.
+    Raises ParameterError for settings that a node refuses, BagError if the bag lacks a topic that
+    a node needs, GraphError if a node stops answering or somebody flies here.
+    """
+    with _context(_remapping(recording, names), domain, hidden=rate is None) as context:
+        graph = _Graph(recording, case, names, context)
+        try:
+            if rate is not None:
+                graph.refuse_company()
+            graph.bring_up()
+            graph.feed(rate, progress)
+        finally:
+            graph.close()
+    comparisons = [
+        compare(
+            name,
+            topic,
+            recording.topics.get(topic),
+            graph.answers[topic],
+            graph.complete[name],
+        )
+        for name in names
+        for topic in ANSWERS[name]
+    ]
+    if not any(entry.compared for entry in comparisons):
+        raise BagError(f"{recording.path} holds no command of {', '.join(names)} with its inputs")
+    states = len(recording.topics[STATE])
+    skipped = {name: states - len(graph.complete[name]) for name in names}
+    return Replay(graph.steps, graph.answers, comparisons, skipped)
+
+
+def _remapping(recording: Recording, names: Sequence[str]) -> list[str]:
+    """Remapping rules of ROS: where each replayed node publishes."""
+    rules = []
+    for name in names:
+        for topic in (*ANSWERS[name], DIAGNOSTICS):
+            if topic is DIAGNOSTICS or topic in recording.topics:
+                rules += ["-r", f"{name}:{topic.name}:={REPLAYED}{topic.name}"]
+    return ["--ros-args", *rules]
+
+
+@contextmanager
+def _context(
+    arguments: Sequence[str], domain: int | None, hidden: bool
+) -> Iterator[rclpy.Context]:
+    """Context of its own; a hidden one is not discovered by anybody, and discovers nobody."""
+    before = os.environ.get(DISCOVERY_RANGE)
+    os.environ[DISCOVERY_RANGE] = "OFF" if hidden else before or "LOCALHOST"
+    context = rclpy.Context()
+    try:
+        rclpy.init(args=list(arguments), context=context, domain_id=domain)
+    finally:
+        if before is None:
+            del os.environ[DISCOVERY_RANGE]
+        else:
+            os.environ[DISCOVERY_RANGE] = before
+    try:
+        yield context
+    finally:
+        rclpy.shutdown(context=context)
+
+
+class _Graph:
+    """The feeder and the replayed nodes."""
+
+    def __init__(
+        self, recording: Recording, case: Case, names: Sequence[str], context: rclpy.Context
+    ):
+        self._recording = recording
+        self.steps = sorted(set().union(*recording.topics.values()))
+        self.answers: dict[LoopTopic, dict[int, Values]] = {
+            topic: {} for name in names for topic in ANSWERS[name]
+        }
+        self.complete: dict[str, list[int]] = {}  # stamps of the steps that a node can answer
+        self._received = 0
+        self._wanted = 0
+        self._reached = Future(executor=None)
+        self._executor: Executor = EventsExecutor(context=context)
+        self._feeder: Node = rclpy.create_node("replay", context=context)
+        self._executor.add_node(self._feeder)
+        self._nodes: dict[str, BaseNode] = {}
+        for name in names:
+            self._nodes[name] = node_class(name)(case.parameters[name], context)
+
+    def refuse_company(self) -> None:
+        """Raise GraphError if somebody flies here: recorded commands must not reach a vehicle."""
+        self._spin(LISTEN)
+        for topic in LOOP_TOPICS:
+            if self._feeder.count_publishers(topic.name):
+                raise GraphError(
+                    f"somebody publishes {topic.name} in this ROS domain: "
+                    "set ROS_DOMAIN_ID to one of your own"
+                )
+
+    def bring_up(self) -> None:
+        """Start the nodes and find out which steps of the recording each of them can answer."""
+        for topic in self.answers:
+            moved = REPLAYED if topic in self._recording.topics else ""
+            self._feeder.create_subscription(
+                message_class(topic.layout.type_name),
+                moved + topic.name,
+                partial(self._take, topic),
+                quality(durable=True),
+                raw=True,
+            )
+        for name, node in self._nodes.items():
+            node.bring_up()
+            self._executor.add_node(node)
+            self.complete[name] = self._complete(name, node)
+
+    def _take(self, topic: LoopTopic, data: bytes) -> None:
+        decoded = topic.layout.decode(data)
+        assert decoded is not None  # our own nodes keep to the layout
+        stamp, values = decoded
+        self.answers[topic][stamp] = values
+        self._received += 1
+        if self._received == self._wanted and not self._reached.done():
+            self._reached.set_result(None)
+
+    def _complete(self, name: str, node: BaseNode) -> list[int]:
+        """Stamps of the steps that a node has all inputs of; BagError if it can have none."""
+        heard = {subscription.topic_name for subscription in node.subscriptions}
+        inputs = [topic for topic in LOOP_TOPICS if topic.name in heard]
+        self._check(name, [*inputs, *ANSWERS[name]])
+        states = self._stamps(STATE)
+        common = set.intersection(*(self._stamps(topic) for topic in inputs))
+        if name == LEARNER_NODE:  # learns from the step before; starts at any state
+            common = {min(states)} | {stamp + STEP_NS for stamp in common} & states
+        return sorted(common)
+
+    def _check(self, name: str, topics: Sequence[LoopTopic]) -> None:
+        notes = self._recording.notes
+        nominal = notes is None or not notes["parameters"]["inner_loop"]["adaptive"]
+        for topic in topics:
+            replayed = nominal and topic in LEARNER_TOPICS and topic in self.answers
+            if topic not in self._recording.topics and not replayed:
+                raise BagError(
+                    f"{self._recording.path} holds no messages on {topic.name}, "
+                    f"without which {name} cannot be replayed"
+                )
+
+    def _stamps(self, topic: LoopTopic) -> set[int]:
+        """Stamps at which the nodes hear a topic, recorded or replayed."""
+        recorded = self._recording.topics.get(topic)
+        return set(recorded if recorded is not None else self.complete[LEARNER_NODE])
+
+    def feed(self, rate: float | None, progress: Callable[[int], None]) -> None:
+        """Publish the recording in the order of its stamps, at `rate` or as fast as possible."""
+        publish = {
+            topic: self._feeder.create_publisher(
+                message_class(topic.layout.type_name), topic.name, quality(durable=True)
+            ).publish
+            for topic in self._recording.topics
+        }
+        changes = list(self._recording.changes)
+        started = time.monotonic()
+        for number, stamp in enumerate(self.steps):
+            if rate is not None:
+                due = started + (stamp - self.steps[0]) / NANOSECONDS / rate
+                self._spin(due - time.monotonic())
+            changed = changes and changes[0].stamp <= stamp
+            if changed or number % BATCH == 0:
+                self._await_answers(stamp)
+                progress(number)
+            while changes and changes[0].stamp <= stamp:
+                self._change(changes.pop(0))
+            for topic, messages in self._recording.topics.items():
+                if stamp in messages:
+                    publish[topic](messages[stamp].data)
+        self._await_answers(self.steps[-1] + 1)
+        progress(len(self.steps))
+
+    def _await_answers(self, end: int) -> None:
+        """Wait until all steps before `end` [ns] are answered."""
+        since = time.monotonic()
+        while True:
+            unsent = sum(
+                node.health.total[Fault.OUTPUT_NOT_FINITE] for node in self._nodes.values()
+            )
+            self._wanted = self._expected(end) - unsent
+            received = self._received
+            if received >= self._wanted:
+                return
+            self._reached = Future(executor=None)
+            self._executor.spin_until_future_complete(self._reached, LOOK)
+            if self._received > received:
+                since = time.monotonic()
+            elif time.monotonic() - since > LONGEST_SILENCE:
+                raise GraphError(
+                    f"{self._wanted - received} commands up to {end / NANOSECONDS:g} s have not "
+                    f"come for {LONGEST_SILENCE:g} s"
+                )
+
+    def _expected(self, end: int) -> int:
+        return sum(
+            len(ANSWERS[name]) * bisect_left(stamps, end) for name, stamps in self.complete.items()
+        )
+
+    def _change(self, change: Change) -> None:
+        """Change parameters as in flight."""
+        node = self._nodes.get(change.node)
+        if node is None:
+            return
+        given = [RosParameter(name, value=value) for name, value in change.values.items()]
+        for result in node.set_parameters(given):
+            if not result.successful:
+                raise ParameterError(f"a change in flight cannot be made again: {result.reason}")
+
+    def _spin(self, seconds: float) -> None:
+        if seconds > 0.0:
+            self._executor.spin_until_future_complete(Future(executor=None), seconds)
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+        nodes = [self._feeder, *self._nodes.values()]
+        for node in nodes:
+            self._executor.remove_node(node)
+        self._executor.shutdown()
+        for node in reversed(nodes):
+            node.destroy_node()

@@ -1,0 +1,129 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Recorded and replayed commands side by side."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ahv_analysis.replay.inputs import Message
+from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.node.synchronizer import Values
+from ahv_msgs_py.topics import LoopTopic
+
+
+class Difference(NamedTuple):
+    """One field of one command that came out otherwise, in the unit of its topic."""
+
+    stamp: int  # [ns]
+    node: str
+    topic: str
+    field: str
+    recorded: float
+    replayed: float
+
+    @property
+    def size(self) -> float:
+        """Replayed less recorded value."""
+        return self.replayed - self.recorded
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it under the names that `--json` uses."""
+        return {
+            "time_s": self.stamp / NANOSECONDS,
+            "node": self.node,
+            "topic": self.topic,
+            "field": self.field,
+            "recorded": self.recorded,
+            "replayed": self.replayed,
+            "difference": self.size,
+        }
+
+
+class Comparison(NamedTuple):
+    """The commands of one topic."""
+
+    node: str
+    topic: str
+    in_bag: bool
+    compared: int
+    differences: int  # commands that are not alike to the last bit
+    missing: int  # recorded commands that the node did not give again, though it could
+    unrecorded: int  # replayed commands that are not in the bag, though others of the topic are
+    first: Difference | None
+    largest: Difference | None
+
+
+def compare(
+    node: str,
+    topic: LoopTopic,
+    recorded: Mapping[int, Message] | None,
+    replayed: Mapping[int, Values],
+    complete: Sequence[int],
+) -> Comparison:
+    """Compare what `node` commanded on `topic`, by stamp [ns], bit for bit.
+
+    `recorded` is None if the bag does not have the topic; `complete` are the stamps of the steps
+    that the node had all inputs of.
+    """
+    known = recorded or {}
+    common = sorted(known.keys() & replayed.keys())
+    first = largest = None
+    differing = 0
+    if common:
+        before = np.array([known[stamp].values for stamp in common])
+        after = np.array([replayed[stamp] for stamp in common])
+        unlike = before.view(np.uint64) != after.view(np.uint64)
+        differing = int(np.count_nonzero(unlike.any(axis=1)))
+        if differing:
+            sizes = np.where(unlike, np.abs(after - before), -1.0)
+            first, largest = (
+                Difference(
+                    common[row],
+                    node,
+                    topic.name,
+                    topic.layout.fields[column],
+                    float(before[row, column]),
+                    float(after[row, column]),
+                )
+                for row, column in (
+                    np.unravel_index(flat, unlike.shape)
+                    for flat in (np.argmax(unlike), np.argmax(sizes))
+                )
+            )
+    return Comparison(
+        node,
+        topic.name,
+        recorded is not None,
+        len(common),
+        differing,
+        len((known.keys() & set(complete)) - replayed.keys()),
+        len(replayed.keys() - known.keys()) if known else 0,
+        first,
+        largest,
+    )
+
+
+def first_of(comparisons: Iterable[Comparison]) -> Difference | None:
+    """Earliest difference; of several at one time, that of the topic that comes first."""
+    found = [entry.first for entry in comparisons if entry.first is not None]
+    return min(found, key=lambda difference: difference.stamp, default=None)
+
+
+def largest_of(comparisons: Iterable[Comparison]) -> Difference | None:
+    """Difference of the largest number, whatever its unit."""
+    found = [entry.largest for entry in comparisons if entry.largest is not None]
+    return max(found, key=lambda difference: abs(difference.size), default=None)
+
+
+def total(comparisons: Sequence[Comparison]) -> dict[str, Any]:
+    """Counts and differences of several topics, as `--json` prints them."""
+    first, largest = first_of(comparisons), largest_of(comparisons)
+    return {
+        "compared": sum(entry.compared for entry in comparisons),
+        "differences": sum(entry.differences for entry in comparisons),
+        "missing": sum(entry.missing for entry in comparisons),
+        "unrecorded": sum(entry.unrecorded for entry in comparisons),
+        "first": first and first.as_json(),
+        "largest": largest and largest.as_json(),
+    }

@@ -1,0 +1,234 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A page of one flight, or of several overlaid, as one HTML file that needs nothing else."""
+
+import json
+import math
+from base64 import b64encode
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from importlib.resources import files
+from io import StringIO
+from typing import Any, NamedTuple
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib import pyplot
+
+from ahv_analysis.bag.record import Array
+from ahv_analysis.flight.case import NODES
+from ahv_analysis.report.page_figures import flight_figures
+from ahv_analysis.report.page_flight import Flight
+from ahv_analysis.report.signals import AXES, CONTROLS, GROUPS, TRACKED, Group, Signal
+from ahv_msgs_py.parameters import Value
+
+PAGE = "template"  # folder of template, style, script and plotting library
+NONE = "–"  # of what does not apply
+
+
+class Row(NamedTuple):
+    """One metric of several flights, as it is printed."""
+
+    name: str
+    unit: str
+    values: list[str]
+
+
+class Setting(NamedTuple):
+    """One parameter of several flights."""
+
+    node: str
+    name: str
+    unit: str
+    description: str
+    values: list[Value | None]
+    usual: bool  # all have its default
+
+    @property
+    def alike(self) -> bool:
+        """Whether all flights have the same."""
+        return len(set(self.values)) == 1
+
+
+def number(value: float | None) -> str:
+    """Write a number with four digits, and what is nothing but rounding as zero."""
+    if value is None:
+        return NONE
+    if abs(value) < 1e-6:
+        return "0"
+    if not 1e-3 <= abs(value) < 1e6:
+        text = f"{value:.2e}"
+    else:
+        text = f"{value:,.{max(0, 3 - math.floor(math.log10(abs(value))))}f}"
+    return text.replace("-", "−").replace(",", "\u202f")
+
+
+def seconds(value: float | None, never: str = NONE) -> str:
+    """Write a time [s] to the step."""
+    return never if value is None else f"{value:.2f}".rstrip("0").rstrip(".") + " s"
+
+
+def setting(value: Value | None) -> str:
+    """Write a parameter; a drawn one with six digits."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return NONE if value is None else str(value)
+
+
+def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
+    """HTML of a page of the flights, with `figures` as SVG."""
+    environment = Environment(
+        loader=PackageLoader(__package__, PAGE),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters |= {"number": number, "seconds": seconds, "setting": setting}
+    folder = files(__package__) / PAGE
+    names = ("page.css", "page.js", "uPlot.min.css", "uPlot.iife.min.js", "uPlot.LICENSE")
+    return environment.get_template("page.html").render(
+        flights=flights,
+        alone=flights[0] if len(flights) == 1 else None,
+        tracked=TRACKED,
+        controls=CONTROLS,
+        axes=AXES,
+        compared=dict(_compared(flights)),
+        groups=list(_groups(flights)),
+        settings=list(_settings(flights)),
+        figures=[b64encode(figure.encode()).decode() for figure in figures],
+        data=_data(flights),
+        assets={name: (folder / name).read_text(encoding="utf-8") for name in names},
+    )
+
+
+def draw_figures(flight: Flight) -> list[str]:
+    """Draw the report's figures of a flight as SVG."""
+    plates, draw = flight_figures(flight.record, flight.case)
+    drawings = []
+    for plate in plates:
+        figure, drawing = draw(plate), StringIO()
+        figure.savefig(drawing, format="svg", metadata={"Date": None})
+        pyplot.close(figure)
+        drawings.append(drawing.getvalue())
+    return drawings
+
+
+def _compared(flights: Sequence[Flight]) -> Iterator[tuple[str, list[Row]]]:
+    """Metrics of the flights side by side, under headings."""
+
+    def row(name: str, unit: str, *path: str, form: Callable[[Any], str] = number) -> Row:
+        values: list[str] = []
+        for flight in flights:
+            found: Any = flight.metrics
+            for step in path:
+                found = NONE if found in (None, NONE) else found.get(step, NONE)
+            values.append(NONE if found == NONE else form(found))
+        return Row(name, unit, values)
+
+    for title, field in (("RMS error", "rms"), ("Overshoot", "overshoot")):
+        yield title, [row(one.name, one.unit, "tracking", one.name, field) for one in TRACKED]
+    settled = partial(seconds, never="not yet")
+    yield (
+        "Settled",
+        [row(one.name, "", "tracking", one.name, "settling_s", form=settled) for one in TRACKED],
+    )
+    efforts = [f"{one.unit}²·s" if one.unit else "s" for one in CONTROLS]
+    yield (
+        "Control effort",
+        [
+            row(one.name, unit, "controls", one.name, "effort")
+            for one, unit in zip(CONTROLS, efforts, strict=True)
+        ],
+    )
+    yield (
+        "Control travel",
+        [row(one.name, one.unit, "controls", one.name, "travel") for one in CONTROLS],
+    )
+    yield (
+        "At a stop",
+        [row(one.name, "", "controls", one.name, "saturated_s", form=seconds) for one in CONTROLS],
+    )
+    yield (
+        "Margin to inlet unstart",
+        [
+            row(symbol, "deg", "margins", name, "margin_deg")
+            for symbol, name in (("α", "alpha"), ("β", "beta"))
+        ],
+    )
+    if any(flight.metrics["learner"] for flight in flights):
+        for title, field, unit in (
+            ("RMS error of the learned disturbance", "estimate_rms_dps2", "deg/s²"),
+            ("RMS error of the observer", "observer_rms_dps", "deg/s"),
+        ):
+            yield title, [row(axis, unit, "learner", axis, field) for axis, _ in AXES]
+    yield "Fuel", [row("burnt", "kg", "fuel_kg")]
+
+
+def _groups(flights: Sequence[Flight]) -> Iterator[Group]:
+    """Groups of the signals that any of the flights has."""
+    for group in GROUPS:
+        signals = tuple(
+            signal
+            for signal in group.signals
+            if any(signal.values(flight.record) is not None for flight in flights)
+        )
+        if signals:
+            yield Group(group.title, signals)
+
+
+def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
+    """Parameters of the nodes that flew; of disturbances those that were set."""
+    cases = [flight.case for flight in flights if flight.case]
+    for node, parameters in NODES.items():
+        flying = [node != "disturbance_learner" or case.control.learner for case in cases]
+        for parameter in parameters if any(flying) else ():
+            values = [
+                None if flight.case is None else flight.case.parameters[node][parameter.name]
+                for flight in flights
+            ]
+            usual = set(values) <= {parameter.default, None}
+            if not (usual and parameter.name.startswith("disturbance.")):
+                yield Setting(
+                    node, parameter.name, parameter.unit, parameter.description, values, usual
+                )
+
+
+def _data(flights: Sequence[Flight]) -> str:
+    """What page.js draws, as JSON that can stand within HTML: every step of every flight."""
+    content = {
+        "flights": [
+            {"name": flight.name, "lost": flight.lost_at, "time": _encode(flight.record.time)}
+            for flight in flights
+        ],
+        "plots": [
+            _plot(signal, flights) for group in _groups(flights) for signal in group.signals
+        ],
+    }
+    return json.dumps(content, allow_nan=False).replace("<", "\\u003c")
+
+
+def _plot(signal: Signal, flights: Sequence[Flight]) -> dict[str, Any]:
+    bounds = {signal.bounds(flight.settings) for flight in flights} - {None}
+    lines = []
+    for index, flight in enumerate(flights):
+        values = signal.values(flight.record)
+        if values is None:
+            continue
+        lines.append({"flight": index, "reference": False, "values": _encode(values)})
+        reference = signal.reference(flight.record, flight.settings)
+        if reference is not None:
+            lines.append({"flight": index, "reference": True, "values": _encode(reference)})
+    return {
+        "name": signal.name,
+        "referenceName": signal.reference_name,
+        "bounds": bounds.pop() if len(bounds) == 1 else None,
+        "lines": lines,
+    }
+
+
+def _encode(values: Array) -> str:
+    """Little-endian 32-bit floats in base64; what they cannot hold becomes NaN, a gap."""
+    with np.errstate(over="ignore"):
+        single = values.astype("<f4")
+    single[~np.isfinite(single)] = np.nan
+    return b64encode(single.tobytes()).decode()

@@ -1,0 +1,127 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""The guard of one input: every message is judged before anything is done with it."""
+
+from collections.abc import Callable
+from math import isfinite
+from operator import le
+
+from ahv_msgs_py.layout import MessageError
+from ahv_msgs_py.node.faults import PERIOD, SILENCE, STALE, Fault
+from ahv_msgs_py.topics import LoopTopic
+
+Values = tuple[float, ...]
+REACH = 3  # numbers by which a publisher may be ahead of one message a step
+
+
+class Refusal(Exception):
+    """A message that is not obeyed: `fault` says why, and the text in which way."""
+
+    def __init__(self, fault: Fault, text: str):
+        """Name the fault and its particulars."""
+        super().__init__(text)
+        self.fault = fault
+
+
+class Guard:
+    """Judges the messages of a topic; lets through one voice, in order, with values that can be.
+
+    A message does not say who sent it. The middleware numbers the messages of every publisher from
+    1 on, and that tells one from another: the publisher whose message was accepted first is obeyed
+    as long as its numbers go on, by one or so a step. Another one is refused until the first has
+    been silent for `SILENCE` of real time; in lockstep, where silence means nothing, until it is
+    the only one.
+    """
+
+    def __init__(
+        self,
+        topic: LoopTopic,
+        general: Callable[[bytes], tuple[int, Values]],
+        clock: Callable[[], int],
+        realtime: bool,
+        publishers: Callable[[], int],
+    ):
+        """`general(data)` reads messages of another layout; `clock()` is steady, in ns.
+
+        `publishers()` counts the topic's publishers.
+        """
+        self._topic = topic
+        self._low = tuple(low for low, _ in topic.bounds)
+        self._high = tuple(high for _, high in topic.bounds)
+        self._decode = topic.layout.decode
+        self._general = general
+        self._clock = clock
+        self._realtime = realtime
+        self._publishers = publishers
+        self._sequence: int | None = None
+        self._stamp = -1  # [ns] of the last message that was accepted
+        self._heard = 0  # [ns] when that was
+
+    def read(self, data: bytes, sequence: int, now: int | None) -> tuple[int, Values]:
+        """Stamp [ns] and values of a message, or Refusal.
+
+        `sequence` is its number at its publisher, `now` the stamp of the newest state, if known.
+        """
+        ahead = 1 if self._sequence is None else sequence - self._sequence
+        same_voice = 0 < ahead <= REACH
+        if same_voice and self._sequence is not None:
+            self._sequence = sequence  # though the message may yet be refused
+        stamp, values = self._judge(data)
+        if self._realtime and now is not None:
+            self._check_age(stamp, now)
+        missed = (stamp - self._stamp) // PERIOD  # steps of which nothing came
+        if not (same_voice or 0 < ahead <= REACH + missed):
+            self._check_takeover()
+        if stamp <= self._stamp:
+            known = f"stamp {stamp / 1e9:g} s after {self._stamp / 1e9:g} s"
+            raise Refusal(Fault.DUPLICATE if stamp == self._stamp else Fault.OUT_OF_ORDER, known)
+        self._sequence, self._stamp = sequence, stamp
+        if self._realtime:
+            self._heard = self._clock()
+        return stamp, values
+
+    def _judge(self, data: bytes) -> tuple[int, Values]:
+        """Stamp and values, if they can be those of the topic at all."""
+        known = self._decode(data)
+        if known is None:
+            try:
+                known = self._general(data)
+            except MessageError as error:
+                raise Refusal(Fault.MALFORMED, str(error)) from error
+        stamp, values = known
+        if not (all(map(le, self._low, values)) and all(map(le, values, self._high))):
+            raise self._out_of_range(values)
+        if stamp < 0 or stamp % PERIOD:
+            raise Refusal(Fault.WRONG_STAMP, f"stamp {stamp} ns is no step of the flight")
+        return known
+
+    def _out_of_range(self, values: Values) -> Refusal:
+        for name, value, (low, high) in zip(
+            self._topic.layout.fields, values, self._topic.bounds, strict=True
+        ):
+            if not isfinite(value):
+                return Refusal(Fault.NOT_FINITE, f"{name} is {value}")
+            if not low <= value <= high:
+                return Refusal(
+                    Fault.OUT_OF_RANGE, f"{name} is {value:g}, but must be {low:g} to {high:g}"
+                )
+        raise AssertionError("all values are in range")
+
+    def _check_age(self, stamp: int, now: int) -> None:
+        if stamp > now + STALE:  # an answer may overtake its state, but not by much
+            raise Refusal(
+                Fault.WRONG_STAMP, f"stamp {stamp / 1e9:g} s at {now / 1e9:g} s of the flight"
+            )
+        if stamp < now - STALE:
+            raise Refusal(Fault.STALE, f"stamp {stamp / 1e9:g} s at {now / 1e9:g} s of the flight")
+
+    def _check_takeover(self) -> None:
+        """Let another publisher take over, or refuse its message."""
+        others = self._publishers()
+        silent = self._realtime and self._clock() - self._heard > SILENCE
+        if not silent and (self._realtime or others > 1):
+            raise Refusal(Fault.SECOND_PUBLISHER, f"there are {others} publishers of the topic")
+        self._stamp = -1
+
+    def forget(self) -> None:
+        """Take stamps from the beginning again: a new flight starts."""
+        self._stamp = -1

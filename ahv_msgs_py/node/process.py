@@ -1,0 +1,60 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A node as a process: start, spin, end."""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from ahv_msgs_py.node.base_node import AUTOSTART, BaseNode
+from ahv_msgs_py.node.real_time import take_precedence
+from ahv_msgs_py.parameters import ParameterError
+
+LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
+DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # this machine alone, unless it is set
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def run(node_class: Callable[[], BaseNode]) -> None:
+    """Entry point of a node: run it until its `finished` is set or a signal comes.
+
+    It configures and activates itself; with `autostart` false the lifecycle services do that.
+    """
+    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
+    stop = threading.Event()
+    for number in SIGNALS:  # never in the middle of a message, and a second one changes nothing
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # arguments that ROS itself refuses
+        print(" ".join(str(error).split()), file=sys.stderr)
+        sys.exit(2)
+    code = 0
+    node = None
+    executor = EventsExecutor()
+    try:
+        node = node_class()
+        executor.add_node(node)
+        if node.realtime:
+            take_precedence()
+        if node.refusal or node.settings[AUTOSTART.name]:
+            node.bring_up()
+        while not (node.finished.done() or stop.is_set()):
+            executor.spin_until_future_complete(node.finished, LOOK)
+        code = 1 if node.finished.done() and node.finished.result() else 0
+    except ParameterError as error:
+        print(error, file=sys.stderr)
+        code = 2
+    finally:
+        if node is not None:
+            executor.remove_node(node)
+        executor.shutdown()
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    sys.exit(code)

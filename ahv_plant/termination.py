@@ -1,0 +1,35 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""When a flight is over because the model no longer describes the vehicle."""
+
+from enum import IntEnum
+
+from ahv_plant.model.atmosphere import ALTITUDE_MAXIMUM, ALTITUDE_MINIMUM, geopotential_altitude
+from ahv_plant.model.vectors import State
+from ahv_plant.numerics.elementwise import elementwise, select
+
+
+class Departure(IntEnum):
+    """Why the flight cannot go on."""
+
+    NONE = 0
+    STATE_IS_NOT_FINITE = 1
+    LEFT_THE_ATMOSPHERE_MODEL = 2  # above 47 km or below 0
+
+
+@elementwise
+def departure(state: State, geometric: bool) -> int:
+    """Departure of a state, as a plain number."""
+    H = geopotential_altitude(state.h, geometric)
+    total = state.u + state.v + state.w + state.P + state.Q + state.R
+    total = total + state.phi + state.theta + state.psi + state.x + state.y + H + state.mass
+    finite = total - total == 0.0
+    inside = (H >= ALTITUDE_MINIMUM) & (H <= ALTITUDE_MAXIMUM)
+    return select(finite, select(inside, 0, 2), 1)
+
+
+def departure_reason(state: State, geometric: bool, time: float) -> str:
+    """Why the flight ends with `state` at `time` [s], in words; empty if it does not."""
+    left = Departure(departure(state, geometric))
+    if left == Departure.NONE:
+        return ""
+    return f"{left.name.lower().replace('_', ' ')} at {time:g} s"
