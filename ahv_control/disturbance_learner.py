@@ -13,8 +13,8 @@ from math import sqrt
 from typing import NamedTuple
 
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
-from ahv_control.intermediate_loop import Rates
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
+from ahv_plant.model.vectors import Rates
 from ahv_plant.numerics.elementwise import elementwise, select
 
 

@@ -6,7 +6,6 @@ import rclpy
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.flight_control import NEUTRAL, first_learner, next_learner
 from ahv_control.held_inputs import held_rates, held_surfaces, nothing
-from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.parameters import LEARNER_PARAMETERS, learner_settings
 from ahv_msgs_py.node.base_node import BaseNode
@@ -22,7 +21,7 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
 )
 from ahv_plant.model.constants import DEGREES, STEP_NS
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Rates, State, Surfaces
 from ahv_plant.parameters import DEFAULT_START
 
 

@@ -14,7 +14,7 @@ everywhere.
 
 from typing import NamedTuple
 
-from ahv_control.intermediate_loop import Rates
+from ahv_plant.model.vectors import Rates
 from ahv_plant.numerics.elementary import power
 from ahv_plant.numerics.elementwise import elementwise, select
 

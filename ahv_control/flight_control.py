@@ -11,11 +11,11 @@ from ahv_control.disturbance_learner import (
     start_learner,
 )
 from ahv_control.inner_loop import InnerLoop, Learned, adaptive_surfaces, nominal_surfaces
-from ahv_control.intermediate_loop import IntermediateLoop, Rates, rate_command
+from ahv_control.intermediate_loop import IntermediateLoop, rate_command
 from ahv_control.newton_raphson import nominal_response
-from ahv_control.outer_loop import Attitude, OuterLoop, attitude_command
+from ahv_control.outer_loop import OuterLoop, attitude_command
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Attitude, Rates, State, Surfaces
 from ahv_plant.numerics.elementwise import elementwise
 
 # The search for the first command starts here; later ones start at the command before.

@@ -4,9 +4,8 @@
 from typing import NamedTuple
 
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
-from ahv_control.intermediate_loop import Rates
 from ahv_control.newton_raphson import Solution, solve_surfaces
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Rates, State, Surfaces
 from ahv_plant.numerics.elementwise import elementwise
 
 

@@ -6,7 +6,6 @@ import rclpy
 from ahv_control.flight_control import NEUTRAL
 from ahv_control.held_inputs import held_estimate, held_rates, nothing
 from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
-from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import learned_of, unlearned
 from ahv_control.newton_raphson import Solution, SolverStatus
 from ahv_control.parameters import INNER_LOOP_PARAMETERS, inner_loop
@@ -21,7 +20,7 @@ from ahv_msgs_py.topics import (
     RATE_COMMAND,
     SURFACE_COMMAND,
 )
-from ahv_plant.model.vectors import State
+from ahv_plant.model.vectors import Rates, State
 from ahv_plant.parameters import DEFAULT_START
 
 FAULTS = {

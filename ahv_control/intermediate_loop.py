@@ -3,8 +3,7 @@
 
 from typing import NamedTuple
 
-from ahv_control.outer_loop import Attitude
-from ahv_plant.model.vectors import State
+from ahv_plant.model.vectors import Attitude, Rates, State
 from ahv_plant.numerics.elementary import sin_cos
 from ahv_plant.numerics.elementwise import elementwise
 
@@ -15,14 +14,6 @@ class IntermediateLoop(NamedTuple):
     k_phi: float  # [1/s]
     k_theta: float  # [1/s]
     k_psi: float  # [1/s]
-
-
-class Rates(NamedTuple):
-    """Body rates or commands for them [rad/s], or their own rates [rad/s^2]."""
-
-    P: float  # roll
-    Q: float  # pitch
-    R: float  # yaw
 
 
 @elementwise

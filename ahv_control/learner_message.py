@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 from ahv_control.disturbance_learner import LearnerState
 from ahv_control.inner_loop import Learned
-from ahv_control.intermediate_loop import Rates
-from ahv_plant.model.vectors import State
+from ahv_plant.model.vectors import Rates, State
 
 
 def learner_values(learner: LearnerState) -> tuple[float, ...]:

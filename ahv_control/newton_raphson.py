@@ -7,7 +7,6 @@ Newton-Raphson with an analytic Jacobian on f(X, U) of eq 2.3.
 from enum import IntEnum
 from typing import NamedTuple
 
-from ahv_control.intermediate_loop import Rates
 from ahv_plant.model.aerodynamics import (
     AirData,
     Coefficients,
@@ -19,7 +18,7 @@ from ahv_plant.model.aerodynamics import (
 )
 from ahv_plant.model.mass import Inertia, centre_of_gravity, inertia
 from ahv_plant.model.rigid_body import angular_acceleration
-from ahv_plant.model.vectors import State, Surfaces, limit_surfaces
+from ahv_plant.model.vectors import Rates, State, Surfaces, limit_surfaces
 from ahv_plant.numerics.elementwise import elementwise, select
 
 # A determinant below this means that the surfaces have lost the vehicle.

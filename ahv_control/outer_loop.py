@@ -4,7 +4,7 @@
 from math import sqrt
 from typing import NamedTuple
 
-from ahv_plant.model.vectors import State, clamp
+from ahv_plant.model.vectors import Attitude, State, clamp
 from ahv_plant.numerics.elementary import asin, atan_ratio, sin_cos
 from ahv_plant.numerics.elementwise import elementwise
 
@@ -15,14 +15,6 @@ class OuterLoop(NamedTuple):
     altitude: float  # [m] h*
     k_h: float  # [1/s]
     alpha_limit: float  # [rad] bound for the angle of attack; pi is no bound
-
-
-class Attitude(NamedTuple):
-    """Euler angles, or commands for them."""
-
-    phi: float  # [rad] roll
-    theta: float  # [rad] pitch
-    psi: float  # [rad] yaw
 
 
 @elementwise

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from ahv_control.disturbance_learner import LearnerSettings
 from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.inner_loop import InnerLoop
-from ahv_control.intermediate_loop import IntermediateLoop, Rates
+from ahv_control.intermediate_loop import IntermediateLoop
 from ahv_control.outer_loop import OuterLoop
 from ahv_control.velocity_loop import VelocityLoop
 from ahv_msgs_py.parameters import Parameter, Value
 from ahv_plant.model.constants import RADIANS
+from ahv_plant.model.vectors import Rates
 from ahv_plant.parameters import GEOMETRIC_ALTITUDE
 
 FASTEST = 50.0  # [1/s] gains above half the control rate cannot be meant

@@ -38,7 +38,7 @@ from ahv_plant.model.constants import STEP, STEP_NS
 from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
 from ahv_plant.safe_command import SAFE_THROTTLE, safe_surfaces
-from ahv_plant.termination import departure_reason
+from ahv_plant.termination import termination_reason
 from ahv_plant.vehicle import vehicle_step
 from ahv_plant.viewer_pose import (
     FLU_IN_FRD,
@@ -85,7 +85,7 @@ class PlantNode(BaseNode):
         self.state = self.flight.initial
         truth = self.flight.truth  # compiled before it flies
         vehicle_step(self.state, Surfaces(0.0, 0.0, 0.0), SAFE_THROTTLE, 0.0, truth)
-        departure_reason(self.state, truth.geometric, 0.0)
+        termination_reason(self.state, truth.geometric, 0.0)
 
     def start(self) -> None:
         """Open the topics; the flight starts, or goes on, when as many listen as should."""
@@ -217,7 +217,7 @@ class PlantNode(BaseNode):
         later = State(
             *vehicle_step(self.state, Surfaces(*surfaces), throttle[0], self.step * STEP, truth)
         )
-        reason = departure_reason(later, truth.geometric, (self.step + 1) * STEP)
+        reason = termination_reason(later, truth.geometric, (self.step + 1) * STEP)
         if reason:
             self._finish(stamp, ERROR, reason)
             return

@@ -8,7 +8,7 @@ from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import elementwise, select
 
 
-class Departure(IntEnum):
+class Termination(IntEnum):
     """Why the flight cannot go on."""
 
     NONE = 0
@@ -17,8 +17,8 @@ class Departure(IntEnum):
 
 
 @elementwise
-def departure(state: State, geometric: bool) -> int:
-    """Departure of a state, as a plain number."""
+def termination(state: State, geometric: bool) -> int:
+    """Why a flight ends at a state, a `Termination` as a plain number."""
     H = geopotential_altitude(state.h, geometric)
     total = state.u + state.v + state.w + state.P + state.Q + state.R
     total = total + state.phi + state.theta + state.psi + state.x + state.y + H + state.mass
@@ -27,9 +27,9 @@ def departure(state: State, geometric: bool) -> int:
     return select(finite, select(inside, 0, 2), 1)
 
 
-def departure_reason(state: State, geometric: bool, time: float) -> str:
+def termination_reason(state: State, geometric: bool, time: float) -> str:
     """Why the flight ends with `state` at `time` [s], in words; empty if it does not."""
-    left = Departure(departure(state, geometric))
-    if left == Departure.NONE:
+    found = Termination(termination(state, geometric))
+    if found == Termination.NONE:
         return ""
-    return f"{left.name.lower().replace('_', ' ')} at {time:g} s"
+    return f"{found.name.lower().replace('_', ' ')} at {time:g} s"

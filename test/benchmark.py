@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 
 from ahv_analysis.bag.dataset import bag_dataset
 from ahv_analysis.bag.reader import read_bag
-from ahv_analysis.campaign.batch import fly_alone, fly_block
+from ahv_analysis.campaign.batch import fly_alone, fly_batch
 from ahv_analysis.campaign.campaign import Campaign, fly_campaign, fly_runs
 from ahv_analysis.campaign.table import REPORT
 from ahv_analysis.flight.case import load_case
@@ -224,13 +224,13 @@ def bench_lanes() -> None:
     result = np.empty((1, LANES))
     chains = 20_000_000
     truth = case.plant.truth
-    fly_block(starts, vehicles, case.plant.truth, case.control, 2)
+    fly_batch(starts, vehicles, case.plant.truth, case.control, 2)
     fly_alone(case.plant.initial, truth, case.control, 2)
     fly_runs(campaign, 0, LANES)
     multiply_add(numbers, 10, result)
     lanes, alone, peaks = [], [], []
     for _ in range(ROUNDS):
-        wall = timed(lambda: fly_block(starts, vehicles, case.plant.truth, case.control, steps))
+        wall = timed(lambda: fly_batch(starts, vehicles, case.plant.truth, case.control, steps))
         lanes.append(wall / steps / LANES)
         wall = timed(lambda: fly_alone(case.plant.initial, truth, case.control, steps))
         alone.append(wall / steps)

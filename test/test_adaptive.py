@@ -14,12 +14,11 @@ from ahv_analysis.flight.case import dispersion_parameters, load_case
 from ahv_analysis.flight.library import fly
 from ahv_control.error_dynamics import ErrorDynamics, decay, error_decay
 from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_demand
-from ahv_control.intermediate_loop import Rates
 from ahv_control.newton_raphson import nominal_response
 from ahv_control.outer_loop import OuterLoop, attitude_command
 from ahv_plant.dispersion import Dispersion, draw_dispersion
 from ahv_plant.model.constants import DEGREES, RADIANS
-from ahv_plant.model.vectors import Surfaces
+from ahv_plant.model.vectors import Rates, Surfaces
 from ahv_plant.numerics.elementary import atan
 from test.flights import CRUISE, STATES, between
 

@@ -10,14 +10,14 @@ from hypothesis import given
 from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.flight_control import FlightControl, nominal_control
 from ahv_control.inner_loop import InnerLoop, nominal_surfaces
-from ahv_control.intermediate_loop import IntermediateLoop, Rates, rate_command
+from ahv_control.intermediate_loop import IntermediateLoop, rate_command
 from ahv_control.newton_raphson import (
     SolverStatus,
     angular_response,
     flight_condition,
     solve_surfaces,
 )
-from ahv_control.outer_loop import Attitude, OuterLoop, attitude_command
+from ahv_control.outer_loop import OuterLoop, attitude_command
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
 from ahv_plant.dispersion import NOMINAL
 from ahv_plant.model.constants import (
@@ -27,7 +27,7 @@ from ahv_plant.model.constants import (
     THROTTLE_MAXIMUM,
     THROTTLE_MINIMUM,
 )
-from ahv_plant.model.vectors import Surfaces
+from ahv_plant.model.vectors import Attitude, Rates, Surfaces
 from ahv_plant.safe_command import safe_surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import CRUISE, STATES, SURFACES, between, degrees

@@ -14,13 +14,13 @@ from ahv_analysis.bag.record import record
 from ahv_analysis.campaign.batch import (
     LIKE,
     fly_alone,
-    fly_block,
+    fly_batch,
     fly_trajectory,
 )
 from ahv_analysis.campaign.campaign import Campaign
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
-from ahv_analysis.flight.outcome import Cause, Tally
+from ahv_analysis.flight.outcome import Cause, Outcome
 from ahv_control.flight_control import (
     NEUTRAL,
     adaptive_control,
@@ -57,8 +57,8 @@ def last_of_flight(state, truth, control, steps):
 
 
 @kernel
-def last_of_block(states, dispersions, like, control, steps, result):
-    """Ends of a block of flights, a row a number."""
+def last_of_batch(states, dispersions, like, control, steps, result):
+    """Ends of a batch of flights, a row a number."""
     truth = Truth(False, load(like[1], dispersions), None)
     store(result, last_of_flight(load(like[0], states), truth, control, steps))
 
@@ -84,9 +84,9 @@ def case():
 
 @pytest.fixture(scope="module")
 def ends(case):
-    """Last states and learners (13 + 39, LANES) of a block of 15 000 steps at 40 %."""
+    """Last states and learners (13 + 39, LANES) of a batch of 15 000 steps at 40 %."""
     result = np.empty((13 + 39, LANES))
-    last_of_block(
+    last_of_batch(
         as_lanes([case.plant.initial] * LANES),
         as_lanes([draw_dispersion(0.4, SEED, run) for run in range(LANES)]),
         LIKE,
@@ -132,17 +132,17 @@ def test_a_lane_has_the_bits_of_plain_python_floats(ends):
 
 ASSEMBLY = """
 import numpy as np
-from ahv_analysis.campaign.batch import LIKE, adaptive_block
+from ahv_analysis.campaign.batch import LIKE, adaptive_batch
 from ahv_analysis.flight.case import load_case
-from ahv_analysis.flight.outcome import Tally
+from ahv_analysis.flight.outcome import Outcome
 from ahv_plant.numerics.simd import LANES
 
 case = load_case("neuro_adaptive_sc_gdi")
 states = np.repeat(np.array(case.plant.initial)[:, None], LANES, axis=1)
-result = np.empty((len(Tally._fields), LANES))
+result = np.empty((len(Outcome._fields), LANES))
 truth, control = case.plant.truth, case.control
-adaptive_block(states, np.ones((9, LANES)), LIKE, truth, control, 1, result)
-print(*adaptive_block.inspect_asm().values())
+adaptive_batch(states, np.ones((9, LANES)), LIKE, truth, control, 1, result)
+print(*adaptive_batch.inspect_asm().values())
 """
 
 
@@ -164,10 +164,10 @@ def test_the_machine_code_is_packed(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["nominal_di_dispersed", "neuro_adaptive_di"])
-def test_a_tally_is_the_same_alone_and_in_a_lane_and_true_of_the_flight(name):
+def test_an_outcome_is_the_same_alone_and_in_a_lane_and_true_of_the_flight(name):
     campaign = Campaign(load_case(name, {"duration": 30.0}), 0.4, 20, SEED)
     runs = range(campaign.runs)
-    tallies = fly_block(
+    outcomes = fly_batch(
         np.array([campaign.start(run) for run in runs]),
         np.array([campaign.dispersion(run) for run in runs]),
         campaign.case.plant.truth,
@@ -177,16 +177,16 @@ def test_a_tally_is_the_same_alone_and_in_a_lane_and_true_of_the_flight(name):
     for run in runs:
         one = campaign.case_of(run)
         alone = fly_alone(one.plant.initial, one.plant.truth, one.control, one.plant.steps)
-        assert same_bits(alone, tallies[run]), run
+        assert same_bits(alone, outcomes[run]), run
     one = campaign.case_of(7)
-    flown, tally = record(fly(one), False), Tally(*tallies[7])
-    until = slice(int(tally.steps))
-    assert tally.max_abs_alpha == pytest.approx(
-        np.max(np.abs(flown.air.alpha[: int(tally.steps) + 1])), rel=1e-12
+    flown, outcome = record(fly(one), False), Outcome(*outcomes[7])
+    until = slice(int(outcome.steps))
+    assert outcome.max_abs_alpha == pytest.approx(
+        np.max(np.abs(flown.air.alpha[: int(outcome.steps) + 1])), rel=1e-12
     )
-    assert tally.min_surface == np.min(flown.surfaces[until])
-    assert tally.max_throttle == np.max(flown.throttle[until])
-    assert tally.final_altitude == flown.column("h")[until][-1]
+    assert outcome.min_surface == np.min(flown.surfaces[until])
+    assert outcome.max_throttle == np.max(flown.throttle[until])
+    assert outcome.final_altitude == flown.column("h")[until][-1]
 
 
 @pytest.mark.parametrize(
@@ -204,11 +204,11 @@ def test_a_broken_lane_fails_with_its_cause_and_touches_no_other(change, cause):
     case = load_case("neuro_adaptive_di")
     starts = [case.plant.initial] * LANES
     vehicles = np.array([draw_dispersion(0.2, SEED, run) for run in range(LANES)])
-    whole = fly_block(np.array(starts), vehicles, case.plant.truth, case.control, 500)
+    whole = fly_batch(np.array(starts), vehicles, case.plant.truth, case.control, 500)
     starts[5] = case.plant.initial._replace(**change)
-    broken = fly_block(np.array(starts), vehicles, case.plant.truth, case.control, 500)
-    assert Tally(*broken[5]).cause == cause
-    assert Tally(*broken[5]).steps == 0
+    broken = fly_batch(np.array(starts), vehicles, case.plant.truth, case.control, 500)
+    assert Outcome(*broken[5]).cause == cause
+    assert Outcome(*broken[5]).steps == 0
     others = np.arange(LANES) != 5
     assert same_bits(broken[others], whole[others])
     assert not np.any(whole[:, 0])
@@ -235,13 +235,13 @@ def test_level_trim_is_the_trim_of_all_seven_equations(run):
         assert found.throttle == pytest.approx(full.throttle, abs=1e-7)
 
 
-def test_a_block_needs_no_multiple_of_the_lanes():
+def test_a_batch_needs_no_multiple_of_the_lanes():
     case = load_case("neuro_adaptive_di")
     vehicles = np.array([draw_dispersion(0.2, SEED, run) for run in range(LANES + 3)])
     starts = np.array([case.plant.initial] * len(vehicles))
-    tallies = fly_block(starts, vehicles, case.plant.truth, case.control, 100)
-    assert tallies.shape == (LANES + 3, len(Tally._fields))
+    outcomes = fly_batch(starts, vehicles, case.plant.truth, case.control, 100)
+    assert outcomes.shape == (LANES + 3, len(Outcome._fields))
     assert same_bits(
-        tallies[-1:], fly_block(starts[-1:], vehicles[-1:], case.plant.truth, case.control, 100)
+        outcomes[-1:], fly_batch(starts[-1:], vehicles[-1:], case.plant.truth, case.control, 100)
     )
     assert State(*starts[0]) == case.plant.initial

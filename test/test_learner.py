@@ -25,10 +25,9 @@ from ahv_control.disturbance_learner import (
 )
 from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.flight_control import adaptive_control, next_learner
-from ahv_control.intermediate_loop import Rates
 from ahv_plant.dispersion import NOMINAL, disturbance_acceleration
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
-from ahv_plant.model.vectors import Surfaces
+from ahv_plant.model.vectors import Rates, Surfaces
 from ahv_plant.vehicle import vehicle_step
 from test.flights import CRUISE, as_python, between
 

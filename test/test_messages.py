@@ -10,7 +10,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 
 from ahv_control.disturbance_learner import Basis, start_learner
-from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learned_of, learner_values, unlearned
 from ahv_msgs_py.layout import MessageError, clock_bytes
 from ahv_msgs_py.node.base_node import message_class
@@ -23,7 +22,7 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
     SURFACE_NAMES,
 )
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Rates, State, Surfaces
 
 pytestmark = pytest.mark.unit
 

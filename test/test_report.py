@@ -139,7 +139,7 @@ def test_why_a_flight_ended_early_is_found_from_the_bag_as_the_engine_said(tmp_p
     assert why_ended_early(record(fly(whole), False), whole) == ""
 
 
-def test_an_interrupted_recording_is_not_taken_for_a_departure(tmp_path):
+def test_an_interrupted_recording_is_not_taken_for_a_termination(tmp_path):
     case = short("nominal_di")
     bag = BagWriter(tmp_path / "bag")
     for step, _ in zip(fly(case), range(51), strict=False):

@@ -13,7 +13,7 @@ import random
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
 from ahv_control.newton_raphson import angular_response, flight_condition, solve_surfaces
-from ahv_control.intermediate_loop import Rates
+from ahv_plant.model.vectors import Rates
 from ahv_plant.model import aerodynamic_fits
 from ahv_plant.numerics import elementary
 from ahv_plant.model.atmosphere import atmosphere

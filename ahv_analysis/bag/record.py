@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from ahv_analysis.flight.library import Step
 from ahv_control.disturbance_learner import disturbance_estimate
-from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import learner_values
 from ahv_control.newton_raphson import nominal_response
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_plant.model.aerodynamics import AirData, air_data
 from ahv_plant.model.constants import UNSTART_ALPHA
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Rates, State, Surfaces
 from ahv_plant.numerics.elementwise import kernel
 
 Array = NDArray[np.float64]

@@ -1,11 +1,11 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""A block of runs advanced together in lanes, and one run alone: the engine of the campaigns."""
+"""A batch of runs advanced together in lanes, and one run alone: the engine of the campaigns."""
 
 import numpy as np
 
 from ahv_analysis.bag.record import Array, FlightRecord
 from ahv_analysis.flight.case import Case
-from ahv_analysis.flight.outcome import START, Tally, count_step, observer_error
+from ahv_analysis.flight.outcome import START, Outcome, count_step, observer_error
 from ahv_control.flight_control import (
     NEUTRAL,
     FlightControl,
@@ -20,7 +20,7 @@ from ahv_plant.model.constants import STEP, STEP_NS
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.numerics.simd import LANES, load, store, widen
-from ahv_plant.termination import departure
+from ahv_plant.termination import termination
 from ahv_plant.vehicle import vehicle_step
 
 # What the rows of the arrays are: load() reads the shape of its result from these.
@@ -29,55 +29,55 @@ LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 
 @kernel
 def fly_adaptive(state, truth, control, steps):
-    """Tally of an adaptive flight; the numbers may be lanes."""
+    """Outcome of an adaptive flight; the numbers may be lanes."""
     one = state.u
     learner = widen(first_learner(state, control.learner), one)
     answer = widen(adaptive_control(state, learner, NEUTRAL, control), one)
-    tally = widen(START, one)
+    outcome = widen(START, one)
     altitude = control.outer.altitude
     for step in range(steps):
         observed = observer_error(state, learner)
-        tally = count_step(tally, state, answer, observed, altitude, truth.geometric)
+        outcome = count_step(outcome, state, answer, observed, altitude, truth.geometric)
         later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
         learner, answer = next_adaptive_control(learner, state, answer, later, control)
         answer = widen(answer, one)
         state = later
     observed = observer_error(state, learner)
-    return count_step(tally, state, answer, observed, altitude, truth.geometric)
+    return count_step(outcome, state, answer, observed, altitude, truth.geometric)
 
 
 @kernel
 def fly_nominal(state, truth, control, steps):
-    """Tally of a nominal flight; the numbers may be lanes."""
+    """Outcome of a nominal flight; the numbers may be lanes."""
     one = state.u
     answer = widen(nominal_control(state, NEUTRAL, control), one)
-    tally = widen(START, one)
+    outcome = widen(START, one)
     observed = widen(0.0, one)
     altitude = control.outer.altitude
     for step in range(steps):
-        tally = count_step(tally, state, answer, observed, altitude, truth.geometric)
+        outcome = count_step(outcome, state, answer, observed, altitude, truth.geometric)
         state = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
         answer = widen(nominal_control(state, answer.surfaces, control), one)
-    return count_step(tally, state, answer, observed, altitude, truth.geometric)
+    return count_step(outcome, state, answer, observed, altitude, truth.geometric)
 
 
 @kernel
-def adaptive_block(states, dispersions, like, truth, control, steps, result):
-    """Fly a block of adaptive runs: states (13, LANES) and dispersions (9, LANES) to result."""
+def adaptive_batch(states, dispersions, like, truth, control, steps, result):
+    """Fly a batch of adaptive runs: states (13, LANES) and dispersions (9, LANES) to result."""
     truth = Truth(truth.geometric, load(like[1], dispersions), truth.disturbance)
     store(result, fly_adaptive(load(like[0], states), truth, control, steps))
 
 
 @kernel
-def nominal_block(states, dispersions, like, truth, control, steps, result):
-    """Fly a block of nominal runs: states (13, LANES) and dispersions (9, LANES) to result."""
+def nominal_batch(states, dispersions, like, truth, control, steps, result):
+    """Fly a batch of nominal runs: states (13, LANES) and dispersions (9, LANES) to result."""
     truth = Truth(truth.geometric, load(like[1], dispersions), truth.disturbance)
     store(result, fly_nominal(load(like[0], states), truth, control, steps))
 
 
 @kernel
-def trim_block(dispersions, like, altitude, speed, mass, geometric, result):
-    """Level trims of a block of vehicles: dispersions (9, LANES) to result (4, LANES)."""
+def trim_batch(dispersions, like, altitude, speed, mass, geometric, result):
+    """Level trims of a batch of vehicles: dispersions (9, LANES) to result (4, LANES)."""
     truth = Truth(geometric, load(like[1], dispersions), None)
     store(result, level_trim(altitude, speed, mass, truth))
 
@@ -90,7 +90,7 @@ def adaptive_trajectory(state, truth, control, steps, every, states, commands):
     for step in range(steps + 1):
         if step % every == 0:
             _keep(step // every, state, answer, states, commands)
-        if departure(state, truth.geometric) != 0:
+        if termination(state, truth.geometric) != 0:
             return step
         later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
         learner, answer = next_adaptive_control(learner, state, answer, later, control)
@@ -105,7 +105,7 @@ def nominal_trajectory(state, truth, control, steps, every, states, commands):
     for step in range(steps + 1):
         if step % every == 0:
             _keep(step // every, state, answer, states, commands)
-        if departure(state, truth.geometric) != 0:
+        if termination(state, truth.geometric) != 0:
             return step
         state = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
         answer = nominal_control(state, answer.surfaces, control)
@@ -142,15 +142,15 @@ def fly_trajectory(case: Case, every: int) -> FlightRecord:
     )
 
 
-def fly_block(
+def fly_batch(
     states: Array, dispersions: Array, truth: Truth, control: FlightControl, steps: int
 ) -> Array:
-    """Tallies (N, 14) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9).
+    """Outcomes (N, 14) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9).
 
     Disturbance and kind of altitude are those of `truth`.
     """
-    fly = nominal_block if control.learner is None else adaptive_block
-    tallies = np.empty((len(Tally._fields), LANES))
+    fly = nominal_batch if control.learner is None else adaptive_batch
+    outcomes = np.empty((len(Outcome._fields), LANES))
     rows = []
     for first in range(0, len(states), LANES):
         fly(
@@ -160,9 +160,9 @@ def fly_block(
             truth,
             control,
             steps,
-            tallies,
+            outcomes,
         )
-        rows.append(tallies.T.copy())
+        rows.append(outcomes.T.copy())
     return np.concatenate(rows)[: len(states)]
 
 
@@ -174,15 +174,15 @@ def find_trims(
     rows = []
     for first in range(0, len(dispersions), LANES):
         vehicles = _lanes(dispersions, first)
-        trim_block(vehicles, LIKE, altitude, speed, mass, geometric, trims)
+        trim_batch(vehicles, LIKE, altitude, speed, mass, geometric, trims)
         rows.append(trims.T.copy())
     return np.concatenate(rows)[: len(dispersions)]
 
 
-def fly_alone(state: State, truth: Truth, control: FlightControl, steps: int) -> Tally:
-    """Tally of one run by scalar code: the same bits as in a lane."""
+def fly_alone(state: State, truth: Truth, control: FlightControl, steps: int) -> Outcome:
+    """Outcome of one run by scalar code: the same bits as in a lane."""
     fly = fly_nominal if control.learner is None else fly_adaptive
-    return Tally(*fly(state, truth, control, steps))
+    return Outcome(*fly(state, truth, control, steps))
 
 
 def _lanes(rows: Array, first: int) -> Array:

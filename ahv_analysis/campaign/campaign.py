@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ahv_analysis.bag.record import Array
-from ahv_analysis.campaign.batch import find_trims, fly_block
+from ahv_analysis.campaign.batch import find_trims, fly_batch
 from ahv_analysis.campaign.store import (
     PART_RUNS,
     Columns,
@@ -24,14 +24,14 @@ from ahv_analysis.campaign.store import (
 )
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.flight.case import Case, Draw, dispersion_parameters, make_case
-from ahv_analysis.flight.outcome import Tally
+from ahv_analysis.flight.outcome import Outcome
 from ahv_plant.dispersion import Dispersion, draw_dispersion
 from ahv_plant.level_trim import LevelTrim
-from ahv_plant.model.constants import DEGREES, STEP
+from ahv_plant.model.constants import DEGREES, STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import source_hash
 
-RUNS_PER_JOB = 64  # four blocks: half a second of work, so that little is lost and little waits
+RUNS_PER_JOB = 64  # four batches: half a second of work, so that little is lost and little waits
 JOBS_UNDER_WAY = 64  # handed to the executor at a time, so that a campaign of any size can wait
 # Random starts of section 3.5.2, around the case's own: plus and minus, in the plant's parameters.
 START_SPREAD = {
@@ -92,7 +92,7 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     states = np.array([campaign.start(run) for run in runs])
     case = campaign.case
     control, geometric = case.control, case.plant.truth.geometric
-    tallies = fly_block(states, dispersions, case.plant.truth, control, case.plant.steps)
+    outcomes = fly_batch(states, dispersions, case.plant.truth, control, case.plant.steps)
     trims = find_trims(
         dispersions,
         control.outer.altitude,
@@ -101,36 +101,36 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
         geometric,
     )
     trim = LevelTrim(*trims.T)
-    return flight_columns(np.array(runs), dispersions, states, tallies) | {
+    return flight_columns(np.array(runs), dispersions, states, outcomes) | {
         "trim_exists": trim.exists == 1.0,
         "trim_alpha_deg": trim.alpha * DEGREES,
     }
 
 
-def flight_columns(runs: Array, dispersions: Array, states: Array, tallies: Array) -> Columns:
+def flight_columns(runs: Array, dispersions: Array, states: Array, outcomes: Array) -> Columns:
     """Columns of the campaign's file that a flight gives."""
-    tally = Tally(*tallies.T)
+    outcome = Outcome(*outcomes.T)
     table: Columns = {"run": runs}
     table |= {name: dispersions[:, i] for i, name in enumerate(Dispersion._fields)}
     table |= {
         f"initial_{name}": states[:, State._fields.index(name)] for name in ("u", *"PQR", "h")
     }
     return table | {
-        "cause": tally.cause.astype(np.int64),
-        "time_s": np.maximum(tally.steps - 1, 0) * STEP,
-        "max_abs_alpha_deg": tally.max_abs_alpha * DEGREES,
-        "alpha_margin_deg": 5.0 - tally.max_abs_alpha * DEGREES,
-        "max_abs_beta_deg": tally.max_abs_beta * DEGREES,
-        "max_abs_rate_dps": tally.max_abs_rate * DEGREES,
-        "max_abs_phi_deg": tally.max_abs_phi * DEGREES,
-        "min_surface_deg": tally.min_surface * DEGREES,
-        "max_surface_deg": tally.max_surface * DEGREES,
-        "min_throttle": tally.min_throttle,
-        "max_throttle": tally.max_throttle,
-        "max_altitude_error_m": tally.max_altitude_error,
-        "max_observer_error_dps": tally.max_observer_error * DEGREES,
-        "final_altitude_m": tally.final_altitude,
-        "final_speed_mps": tally.final_speed,
+        "cause": outcome.cause.astype(np.int64),
+        "time_s": np.maximum(outcome.steps - 1, 0) * STEP,
+        "max_abs_alpha_deg": outcome.max_abs_alpha * DEGREES,
+        "alpha_margin_deg": UNSTART_ALPHA * DEGREES - outcome.max_abs_alpha * DEGREES,
+        "max_abs_beta_deg": outcome.max_abs_beta * DEGREES,
+        "max_abs_rate_dps": outcome.max_abs_rate * DEGREES,
+        "max_abs_phi_deg": outcome.max_abs_phi * DEGREES,
+        "min_surface_deg": outcome.min_surface * DEGREES,
+        "max_surface_deg": outcome.max_surface * DEGREES,
+        "min_throttle": outcome.min_throttle,
+        "max_throttle": outcome.max_throttle,
+        "max_altitude_error_m": outcome.max_altitude_error,
+        "max_observer_error_dps": outcome.max_observer_error * DEGREES,
+        "final_altitude_m": outcome.final_altitude,
+        "final_speed_mps": outcome.final_speed,
     }
 
 

@@ -33,7 +33,6 @@ from ahv_control.flight_control import (
     first_learner,
     next_learner,
 )
-from ahv_control.intermediate_loop import Rates
 from ahv_control.newton_raphson import nominal_response
 from ahv_plant.dispersion import (
     Dispersion,
@@ -42,9 +41,9 @@ from ahv_plant.dispersion import (
     draw_dispersion,
 )
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP, UNSTART_ALPHA
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Rates, State, Surfaces
 from ahv_plant.numerics.elementary import atan
-from ahv_plant.termination import departure
+from ahv_plant.termination import termination
 from ahv_plant.vehicle import vehicle_step
 
 SEED = 20
@@ -54,10 +53,10 @@ STEPS = 15000
 HARD = Dispersion(1.393, 0.623, 0.841, 1.367, 0.612, 0.729, 0.771, 0.669, 0.978)
 
 
-class Outcome(NamedTuple):
+class Score(NamedTuple):
     """What became of one flight."""
 
-    steps: int  # flown before |alpha| > 5 deg, a departure, or the end
+    steps: int  # flown before |alpha| > 5 deg, a termination of the flight, or its end
     largest_error: float  # [deg/s] largest |X - X_a| of any channel
     following: float  # [deg/s] root mean square of X - X_d
     roughness: float  # [deg] mean change of a surface per step
@@ -97,13 +96,13 @@ def explicit_step(
 def fly_study(
     state: State, settings: FlightControl, truth: Truth, explicit: bool, steps: int
 ) -> tuple[int, float, float, float]:
-    """Fly until the end or the loss of the vehicle; sums for `Outcome`."""
+    """Fly until the end or the loss of the vehicle; sums for `Score`."""
     learner = first_learner(state, settings.learner)
     answer = adaptive_control(state, learner, NEUTRAL, settings)
     largest, follow, rough = 0.0, 0.0, 0.0
     for step in range(steps):
         alpha = abs(atan(state.w / state.u))
-        if not alpha <= UNSTART_ALPHA or departure(state, truth.geometric) != 0:
+        if not alpha <= UNSTART_ALPHA or termination(state, truth.geometric) != 0:
             return step, largest, follow, rough
         later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
         before = answer.surfaces
@@ -128,13 +127,13 @@ def fly_study(
     return steps, largest, follow, rough
 
 
-def outcome(
+def score(
     state: State, settings: FlightControl, truth: Truth, explicit: bool = False, steps: int = STEPS
-) -> Outcome:
+) -> Score:
     """Fly one flight of a study."""
     flown, largest, follow, rough = fly_study(state, settings, truth, explicit, steps)
     count = max(flown, 1)
-    return Outcome(
+    return Score(
         flown,
         largest * DEGREES,
         (follow / count) ** 0.5 * DEGREES,
@@ -142,19 +141,19 @@ def outcome(
     )
 
 
-def outcomes(
+def scores(
     state: State,
     settings: FlightControl,
     level: float,
     runs: int,
     explicit: bool = False,
     steps: int = STEPS,
-) -> list[Outcome]:
+) -> list[Score]:
     """Fly drawn vehicles, on all cores."""
 
-    def one(run: int) -> Outcome:
+    def one(run: int) -> Score:
         truth = Truth(dispersion=draw_dispersion(level, SEED, run))
-        return outcome(state, settings, truth, explicit, steps)
+        return score(state, settings, truth, explicit, steps)
 
     with ThreadPoolExecutor() as pool:
         return list(pool.map(one, range(runs)))
@@ -201,7 +200,7 @@ def study_barrier(state: State, settings: FlightControl, levels: Sequence[float]
     k_b = settings.learner.k_b
     for level in levels:
         for explicit in (True, False):
-            found = outcomes(state, settings, level, RUNS, explicit)
+            found = scores(state, settings, level, RUNS, explicit)
             row(
                 level,
                 "explicit" if explicit else "implicit",
@@ -213,7 +212,7 @@ def study_barrier(state: State, settings: FlightControl, levels: Sequence[float]
     row("step", "flown s", "largest error in k_b")
     row(*["---"] * 3)
     for explicit in (True, False):
-        flight = outcome(state, settings, Truth(dispersion=HARD), explicit)
+        flight = score(state, settings, Truth(dispersion=HARD), explicit)
         row(
             "explicit" if explicit else "implicit", flight.steps * STEP, flight.largest_error / k_b
         )
@@ -229,8 +228,8 @@ def study_settings(
             row(*names, "within 5 deg", "X - X_d deg/s", "surface deg/step")
             row(*["---"] * (len(names) + 3))
             continue
-        whole = outcomes(load_case("neuro_adaptive_di").plant.initial, settings, 0.4, RUNS)
-        close = outcomes(start, settings, 0.4, RUNS, steps=2000)
+        whole = scores(load_case("neuro_adaptive_di").plant.initial, settings, 0.4, RUNS)
+        close = scores(start, settings, 0.4, RUNS, steps=2000)
         row(
             *names,
             sum(flight.steps == STEPS for flight in whole),

@@ -13,6 +13,7 @@ from scipy.stats import binomtest
 from ahv_analysis.campaign.campaign import Campaign
 from ahv_analysis.campaign.store import Columns, level_folder, read_parts
 from ahv_analysis.flight.outcome import Cause
+from ahv_plant.model.constants import DEGREES, UNSTART_ALPHA
 
 COUNTED = ("run", "cause", "time_s", "trim_exists", "trim_alpha_deg")
 
@@ -33,7 +34,9 @@ def count_runs(parts: Iterable[Columns], runs: int) -> Counts:
     for part in parts:
         asked = part["run"] < runs
         cause = part["cause"][asked]
-        holdable = part["trim_exists"] & (np.abs(part["trim_alpha_deg"]) <= 5.0)
+        holdable = part["trim_exists"] & (
+            np.abs(part["trim_alpha_deg"]) <= UNSTART_ALPHA * DEGREES
+        )
         holdable = holdable[asked]
         counts.causes.update(cause.tolist())
         counts.holdable += int(np.sum(holdable))

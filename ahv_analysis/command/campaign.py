@@ -188,17 +188,17 @@ def rerun(
     if row is None:
         raise UsageError(f"run {run} is not in {folder}, whose last run is {campaign.runs - 1}")
     case = campaign.case_of(run)
-    tally = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
+    outcome = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
     alone = flight_columns(
         np.array([run]),
         np.array([case.plant.truth.dispersion]),
         np.array([case.plant.initial]),
-        np.array([tally]),
+        np.array([outcome]),
     )
     differing = [name for name in alone if alone[name][0] != row[name]]
     result = {
         "run": run,
-        "cause": Cause(int(tally.cause)).name.lower(),
+        "cause": Cause(int(outcome.cause)).name.lower(),
         "time_s": float(alone["time_s"][0]),
         "max_abs_alpha_deg": float(alone["max_abs_alpha_deg"][0]),
         "same_bits": not differing,

@@ -17,7 +17,6 @@ from ahv_control.flight_control import (
     next_adaptive_control,
     nominal_control,
 )
-from ahv_control.intermediate_loop import Rates
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.topics import (
@@ -32,8 +31,8 @@ from ahv_msgs_py.topics import (
     LoopTopic,
 )
 from ahv_plant.model.constants import STEP, STEP_NS
-from ahv_plant.model.vectors import State
-from ahv_plant.termination import departure_reason
+from ahv_plant.model.vectors import Rates, State
+from ahv_plant.termination import termination_reason
 from ahv_plant.vehicle import vehicle_step
 
 CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
@@ -50,7 +49,7 @@ class Step(NamedTuple):
 
 
 def fly(case: Case) -> Iterator[Step]:
-    """Fly `case`: its steps 0 to N, or fewer if the vehicle departs from the model."""
+    """Fly `case`: its steps 0 to N, or fewer if the model no longer describes the vehicle."""
     state, truth, control = case.plant.initial, case.plant.truth, case.control
     learner = None if control.learner is None else first_learner(state, control.learner)
     if learner is None:
@@ -61,7 +60,7 @@ def fly(case: Case) -> Iterator[Step]:
         later = State(
             *vehicle_step(state, commands.surfaces, commands.throttle, step * STEP, truth)
         )
-        reason = departure_reason(later, truth.geometric, (step + 1) * STEP)
+        reason = termination_reason(later, truth.geometric, (step + 1) * STEP)
         yield Step(step * STEP_NS, state, commands, learner, reason)
         if reason:
             return

@@ -5,11 +5,12 @@ from ahv_analysis.flight.case import load_case
 from ahv_control.disturbance_learner import disturbance_estimate
 from ahv_control.flight_control import NEUTRAL, first_learner, next_learner
 from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
-from ahv_control.intermediate_loop import Rates, rate_command
+from ahv_control.intermediate_loop import rate_command
 from ahv_control.outer_loop import attitude_command
 from ahv_control.velocity_loop import throttle_command
+from ahv_plant.model.vectors import Rates
 from ahv_plant.parameters import DEFAULT_START
-from ahv_plant.termination import departure_reason
+from ahv_plant.termination import termination_reason
 from ahv_plant.vehicle import vehicle_step
 
 
@@ -26,7 +27,7 @@ def compile_laws() -> None:
     learner = next_learner(first_learner(start, law), start, NEUTRAL, still, start, law)
     disturbance_estimate(learner, still)
     vehicle_step(start, NEUTRAL, 0.2, 0.0, truth)
-    departure_reason(start, truth.geometric, 0.0)
+    termination_reason(start, truth.geometric, 0.0)
 
 
 compile_laws()

@@ -13,7 +13,7 @@ from ahv_plant.model.constants import UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementary import atan_ratio
 from ahv_plant.numerics.elementwise import elementwise, select
-from ahv_plant.termination import departure
+from ahv_plant.termination import termination
 
 
 class Cause(IntEnum):
@@ -26,8 +26,8 @@ class Cause(IntEnum):
     INLET_UNSTART = 4  # |alpha| > 5 deg
 
 
-class Tally(NamedTuple):
-    """Of one run, up to its failure; angles in rad, in the order of a block's rows."""
+class Outcome(NamedTuple):
+    """What one run came to, up to its failure; angles in rad, in the order of a batch's rows."""
 
     cause: float  # a Cause
     steps: float  # flown before the failure
@@ -45,7 +45,7 @@ class Tally(NamedTuple):
     final_speed: float  # [m/s]
 
 
-START = Tally(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.0, 0.0)
+START = Outcome(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @elementwise
@@ -58,7 +58,7 @@ def observer_error(state: State, learner: LearnerState) -> float:
 @elementwise
 def cause_now(state: State, status: int, geometric: bool) -> float:
     """Cause for which a flight fails at a state whose surfaces were found with `status`."""
-    left = departure(state, geometric)
+    left = termination(state, geometric)
     unstart = select(abs(atan_ratio(state.w, state.u)) > UNSTART_ALPHA, 4.0, 0.0)
     lost = select(status == 3, 3.0, unstart)
     outside = select(left == 2, 2.0, lost)
@@ -67,37 +67,42 @@ def cause_now(state: State, status: int, geometric: bool) -> float:
 
 @elementwise
 def count_step(
-    tally: Tally, state: State, answer: Commands, observed: float, altitude: float, geometric: bool
-) -> Tally:
-    """Tally after one more state and its answer; once a run has failed nothing changes."""
+    outcome: Outcome,
+    state: State,
+    answer: Commands,
+    observed: float,
+    altitude: float,
+    geometric: bool,
+) -> Outcome:
+    """Outcome after one more state and its answer; once a run has failed nothing changes."""
     alpha = abs(atan_ratio(state.w, state.u))
     v = abs(state.v)
     beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more
-    flying = tally.cause == 0.0
-    cause = select(flying, cause_now(state, answer.status, geometric), tally.cause)
+    flying = outcome.cause == 0.0
+    cause = select(flying, cause_now(state, answer.status, geometric), outcome.cause)
     counts = cause == 0.0
     surfaces = answer.surfaces
     least = -max(-surfaces.right_elevon, -surfaces.left_elevon, -surfaces.rudder)
     most = max(surfaces.right_elevon, surfaces.left_elevon, surfaces.rudder)
     rate = max(abs(state.P), abs(state.Q), abs(state.R))
-    return Tally(
+    return Outcome(
         cause,
-        tally.steps + select(counts, 1.0, 0.0),
+        outcome.steps + select(counts, 1.0, 0.0),
         # the failing state still counts for alpha, so that the margin tells of it
-        select(flying, max(tally.max_abs_alpha, alpha), tally.max_abs_alpha),
-        select(counts, max(tally.max_abs_beta, beta), tally.max_abs_beta),
-        select(counts, max(tally.max_abs_rate, rate), tally.max_abs_rate),
-        select(counts, max(tally.max_abs_phi, abs(state.phi)), tally.max_abs_phi),
-        select(counts, -max(-tally.min_surface, -least), tally.min_surface),
-        select(counts, max(tally.max_surface, most), tally.max_surface),
-        select(counts, -max(-tally.min_throttle, -answer.throttle), tally.min_throttle),
-        select(counts, max(tally.max_throttle, answer.throttle), tally.max_throttle),
+        select(flying, max(outcome.max_abs_alpha, alpha), outcome.max_abs_alpha),
+        select(counts, max(outcome.max_abs_beta, beta), outcome.max_abs_beta),
+        select(counts, max(outcome.max_abs_rate, rate), outcome.max_abs_rate),
+        select(counts, max(outcome.max_abs_phi, abs(state.phi)), outcome.max_abs_phi),
+        select(counts, -max(-outcome.min_surface, -least), outcome.min_surface),
+        select(counts, max(outcome.max_surface, most), outcome.max_surface),
+        select(counts, -max(-outcome.min_throttle, -answer.throttle), outcome.min_throttle),
+        select(counts, max(outcome.max_throttle, answer.throttle), outcome.max_throttle),
         select(
             counts,
-            max(tally.max_altitude_error, abs(state.h - altitude)),
-            tally.max_altitude_error,
+            max(outcome.max_altitude_error, abs(state.h - altitude)),
+            outcome.max_altitude_error,
         ),
-        select(counts, max(tally.max_observer_error, observed), tally.max_observer_error),
-        select(counts, state.h, tally.final_altitude),
-        select(counts, state.u, tally.final_speed),
+        select(counts, max(outcome.max_observer_error, observed), outcome.max_observer_error),
+        select(counts, state.h, outcome.final_altitude),
+        select(counts, state.u, outcome.final_speed),
     )

@@ -10,10 +10,9 @@ from ahv_analysis.flight.outcome import Cause, cause_now
 from ahv_analysis.report.metrics import fuel, margins
 from ahv_control.flight_control import NEUTRAL, FlightControl
 from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
-from ahv_control.intermediate_loop import Rates
 from ahv_plant.model.constants import DEGREES
-from ahv_plant.model.vectors import State, Surfaces
-from ahv_plant.termination import Departure
+from ahv_plant.model.vectors import Rates, State, Surfaces
+from ahv_plant.termination import Termination
 
 
 def summarize(record: FlightRecord, ended_early: str, control: FlightControl) -> dict[str, Any]:
@@ -40,7 +39,7 @@ def summarize(record: FlightRecord, ended_early: str, control: FlightControl) ->
 
 
 def failure(record: FlightRecord, ended_early: str, control: FlightControl) -> Cause:
-    """Return the first cause of failure of a flight, by the rule of the campaigns' tally.
+    """Return the first cause of failure of a flight, by the rule of the campaigns' outcome.
 
     A record does not say how the surfaces were found: they are found again.
     """
@@ -60,5 +59,7 @@ def failure(record: FlightRecord, ended_early: str, control: FlightControl) -> C
             return cause
         previous = Surfaces(*record.surfaces[step].tolist())
     # the state that ended a flight is not in its record
-    words = {left.name.lower().replace("_", " "): Cause[left.name] for left in list(Departure)[1:]}
+    words = {
+        left.name.lower().replace("_", " "): Cause[left.name] for left in list(Termination)[1:]
+    }
     return next((words[key] for key in words if ended_early.startswith(key)), Cause.SUCCESS)

@@ -15,7 +15,7 @@ from ahv_analysis.flight.case import Case
 from ahv_analysis.report.signals import AXES, CONTROLS, TRACKED, Settings
 from ahv_plant.model.constants import DEGREES, STEP, STEP_NS, UNSTART_ALPHA
 from ahv_plant.model.vectors import State, Surfaces
-from ahv_plant.termination import departure_reason
+from ahv_plant.termination import termination_reason
 from ahv_plant.vehicle import vehicle_step
 
 # The report bounds alpha alone. Of beta the same flow angle is taken: an assumption, on which no
@@ -181,7 +181,7 @@ def why_ended_early(record: FlightRecord, case: Case) -> str:
     last = State(*record.states[-1].tolist())
     surfaces = Surfaces(*record.surfaces[-1].tolist())
     later = State(*vehicle_step(last, surfaces, float(record.throttle[-1]), end, truth))
-    reason = departure_reason(later, truth.geometric, (flown + 1) * STEP)
+    reason = termination_reason(later, truth.geometric, (flown + 1) * STEP)
     return reason or f"the recording stops at {end:g} s of {case.plant.steps * STEP:g} s"
 
 

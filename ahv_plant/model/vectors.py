@@ -1,5 +1,5 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""The vectors of the vehicle, by name: state, control surfaces."""
+"""The vectors of the vehicle, by name: state, attitude, rates, control surfaces."""
 
 from typing import NamedTuple
 
@@ -32,6 +32,22 @@ class State(NamedTuple):
     y: float  # [m] distance east
     h: float  # [m] altitude
     mass: float  # [kg]
+
+
+class Attitude(NamedTuple):
+    """Euler angles, or commands for them."""
+
+    phi: float  # [rad] roll
+    theta: float  # [rad] pitch
+    psi: float  # [rad] yaw
+
+
+class Rates(NamedTuple):
+    """Body rates or commands for them [rad/s], or their own rates [rad/s^2]."""
+
+    P: float  # roll
+    Q: float  # pitch
+    R: float  # yaw
 
 
 class Surfaces(NamedTuple):

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from ahv_plant.termination import departure_reason
+from ahv_plant.termination import termination_reason
 from test.flights import CRUISE
 
 pytestmark = pytest.mark.unit
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.unit
 @pytest.mark.parametrize("name", CRUISE._fields)
 @pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
 def test_a_state_that_is_not_finite_ends_the_flight(name, broken):
-    reason = departure_reason(CRUISE._replace(**{name: broken}), False, 2.5)
+    reason = termination_reason(CRUISE._replace(**{name: broken}), False, 2.5)
     assert reason == "state is not finite at 2.5 s"
 
 
@@ -30,5 +30,5 @@ def test_a_state_that_is_not_finite_ends_the_flight(name, broken):
     ],
 )
 def test_the_atmosphere_model_ends_at_47_km(altitude, geometric, inside):
-    reason = departure_reason(CRUISE._replace(h=altitude), geometric, 0.0)
+    reason = termination_reason(CRUISE._replace(h=altitude), geometric, 0.0)
     assert reason == ("" if inside else "left the atmosphere model at 0 s")
