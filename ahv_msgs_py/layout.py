@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 NANOSECONDS = 1_000_000_000  # [ns/s]
+LONGEST_QUOTE = 40  # characters of a foreign text in a sentence of ours
 _ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little-endian, no options
 
 
@@ -29,6 +30,11 @@ def clock_bytes(stamp: int) -> bytes:
 
 class MessageError(ValueError):
     """A message that does not carry what its topic promises; the message says what is wrong."""
+
+
+def excerpt(text: str) -> str:
+    """Text from outside as a sentence can quote it, however long it is."""
+    return repr(text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}…")
 
 
 def _string(text: str, offset: int) -> bytes:
@@ -100,7 +106,7 @@ class Layout:
         """Stamp [ns] and values of a message object of this type; MessageError if unfit."""
         stamp, frame = message.header.stamp, message.header.frame_id
         if frame not in ("", self.frame):
-            raise MessageError(f"frame_id is {frame!r}, but must be {self.frame!r}")
+            raise MessageError(f"frame_id is {excerpt(frame)}, but must be {self.frame!r}")
         return stamp.sec * NANOSECONDS + stamp.nanosec, self._read(message)
 
     def _read(self, message: Any) -> tuple[float, ...]:
@@ -119,11 +125,15 @@ class NamedVector(Layout):
         super().__init__("sensor_msgs/msg/JointState", frame, names, middle, bytes(8))
 
     def _read(self, message: Any) -> tuple[float, ...]:
-        if tuple(message.name) != self.fields or len(message.position) != len(self.fields):
+        names, count = message.name, len(self.fields)
+        if not len(names) == len(message.position) == count:
             raise MessageError(
-                f"names {list(message.name)} with {len(message.position)} positions, "
-                f"but must be {list(self.fields)}, one position each"
+                f"{len(names)} names with {len(message.position)} positions, but must be "
+                f"{count} of each, {self.fields[0]!r} to {self.fields[-1]!r}"
             )
+        for name, field in zip(names, self.fields, strict=True):
+            if name != field:
+                raise MessageError(f"a name is {excerpt(name)}, but must be {field!r}")
         if len(message.velocity) or len(message.effort):
             raise MessageError("velocity and effort are not empty, but nothing is known of them")
         return tuple(message.position)

@@ -15,6 +15,7 @@ from ahv_msgs_py.layout import MessageError, clock_bytes
 from ahv_msgs_py.node.base_node import message_class
 from ahv_msgs_py.topics import (
     BASIS_NAMES,
+    BODY_FRAME,
     LEARNER_NAMES,
     LOOP_TOPICS,
     STATE,
@@ -157,3 +158,17 @@ def test_wrong_names_or_lengths_are_named(names, positions):
 @given(st.binary(max_size=600))
 def test_other_bytes_are_not_taken_for_a_message(data):
     assert STATE.layout.decode(data) is None
+
+
+def test_a_refused_message_of_any_size_is_told_in_a_short_sentence():
+    layout = STATE.layout
+    for names, frame in ((["x"] * 100_000, BODY_FRAME), (["x" * 10**6] * 13, BODY_FRAME)):
+        message = message_of(STATE, 0, (0.0,) * 13)
+        message.name, message.header.frame_id = names, frame
+        with pytest.raises(MessageError) as error:
+            layout.values_of(message)
+        assert len(str(error.value)) < 200
+    message.header.frame_id = "f" * 10**6
+    with pytest.raises(MessageError, match="frame_id is 'ffff") as error:
+        layout.values_of(message)
+    assert len(str(error.value)) < 200

@@ -22,6 +22,23 @@ class Refusal(Exception):
         self.fault = fault
 
 
+def refusal(topic: LoopTopic, stamp: int, values: Values) -> Refusal | None:
+    """Why no receiver obeys values of a topic at `stamp` [ns], whoever sent them; None if not so.
+
+    Those who hear a message and those who read it in a bag judge it alike.
+    """
+    for name, value, (low, high) in zip(topic.layout.fields, values, topic.bounds, strict=True):
+        if not isfinite(value):
+            return Refusal(Fault.NOT_FINITE, f"{name} is {value}")
+        if not low <= value <= high:
+            return Refusal(
+                Fault.OUT_OF_RANGE, f"{name} is {value:g}, but must be {low:g} to {high:g}"
+            )
+    if stamp < 0 or stamp % PERIOD:
+        return Refusal(Fault.WRONG_STAMP, f"stamp {stamp} ns is no step of the flight")
+    return None
+
+
 class Guard:
     """Judges the messages of a topic; lets through one voice, in order, with values that can be.
 
@@ -88,23 +105,12 @@ class Guard:
             except MessageError as error:
                 raise Refusal(Fault.MALFORMED, str(error)) from error
         stamp, values = known
-        if not (all(map(le, self._low, values)) and all(map(le, values, self._high))):
-            raise self._out_of_range(values)
-        if stamp < 0 or stamp % PERIOD:
-            raise Refusal(Fault.WRONG_STAMP, f"stamp {stamp} ns is no step of the flight")
+        in_range = all(map(le, self._low, values)) and all(map(le, values, self._high))
+        if not in_range or stamp < 0 or stamp % PERIOD:
+            refused = refusal(self._topic, stamp, values)
+            assert refused is not None
+            raise refused
         return known
-
-    def _out_of_range(self, values: Values) -> Refusal:
-        for name, value, (low, high) in zip(
-            self._topic.layout.fields, values, self._topic.bounds, strict=True
-        ):
-            if not isfinite(value):
-                return Refusal(Fault.NOT_FINITE, f"{name} is {value}")
-            if not low <= value <= high:
-                return Refusal(
-                    Fault.OUT_OF_RANGE, f"{name} is {value:g}, but must be {low:g} to {high:g}"
-                )
-        raise AssertionError("all values are in range")
 
     def _check_age(self, stamp: int, now: int) -> None:
         if stamp > now + STALE:  # an answer may overtake its state, but not by much
