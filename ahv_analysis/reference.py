@@ -11,8 +11,8 @@ from pathlib import Path
 
 from ahv_analysis.bag.recorder_node import RECORDER_PARAMETERS
 from ahv_analysis.flight.case import NODES
-from ahv_msgs_py.node.base_node import SHELL_PARAMETERS
 from ahv_msgs_py.node.faults import fault_rows
+from ahv_msgs_py.node.managed_node import SHELL_PARAMETERS
 from ahv_msgs_py.parameters import Parameter, Value
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,

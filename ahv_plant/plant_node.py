@@ -14,10 +14,12 @@ from rclpy.qos import QoSProfile
 from visualization_msgs.msg import Marker
 
 from ahv_msgs_py.layout import NANOSECONDS, clock_bytes
-from ahv_msgs_py.node.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import HOLD, Fault
 from ahv_msgs_py.node.health import ERROR, MILLISECONDS, OK, percentile
+from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.process import run
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.node.synchronizer import Stepwise, Values
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import (

@@ -26,7 +26,7 @@ from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly, fly_library
 from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.layout import clock_bytes
-from ahv_msgs_py.node.base_node import quality
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, STATE
 from test.bags import mcap_of

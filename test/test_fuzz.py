@@ -12,8 +12,8 @@ from rclpy.experimental import EventsExecutor
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.process_per_node import node_class
 from ahv_msgs_py.layout import NamedVector
-from ahv_msgs_py.node.base_node import message_class
 from ahv_msgs_py.node.faults import PERIOD, Fault
+from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,

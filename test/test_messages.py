@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_typestore
 from ahv_control.disturbance_learner import Basis, start_learner
 from ahv_control.learner_message import estimate_values, learned_of, learner_values, unlearned
 from ahv_msgs_py.layout import MessageError, clock_bytes
-from ahv_msgs_py.node.base_node import message_class
+from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.topics import (
     BASIS_NAMES,
     BODY_FRAME,

@@ -16,7 +16,8 @@ from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.process_per_node import NODES, controllers, node_class
-from ahv_msgs_py.node.base_node import SENDER_DEPTH, message_class
+from ahv_msgs_py.node.messages import message_class
+from ahv_msgs_py.node.quality import SENDER_DEPTH
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, DIAGNOSTICS, LOOP_TOPICS, ODOMETRY, STATE
 

@@ -31,7 +31,8 @@ from ahv_analysis.replay.replay import ANSWERS, replay
 from ahv_analysis.replay.result import total
 from ahv_control.inner_loop_node import InnerLoopNode
 from ahv_control.outer_intermediate_node import OuterIntermediateNode
-from ahv_msgs_py.node.base_node import message_class, quality
+from ahv_msgs_py.node.messages import message_class
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import (
     LEARNER_TOPICS,
     LOOP_TOPICS,

@@ -204,7 +204,7 @@ def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:
         import rclpy
         from rclpy.serialization import deserialize_message
 
-        from ahv_msgs_py.node.base_node import message_class
+        from ahv_msgs_py.node.messages import message_class
     except ModuleNotFoundError as error:
         raise MessageError("a message of another sender, which only ROS can read") from error
     try:

@@ -15,9 +15,11 @@ from rclpy.subscription import Subscription
 
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
-from ahv_msgs_py.node.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.health import ERROR, OK
+from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.process import run
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import (
     DIAGNOSTICS,

@@ -23,8 +23,9 @@ from ahv_analysis.flight.process_per_node import (
     Watcher,
     set_transport,
 )
-from ahv_msgs_py.node.base_node import message_class, quality
 from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.messages import message_class
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,

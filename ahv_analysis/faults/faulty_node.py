@@ -11,8 +11,9 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from ahv_msgs_py.layout import Layout, NamedVector
-from ahv_msgs_py.node.base_node import BaseNode, quality
+from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import PERIOD
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, LoopTopic
 
 INJECT = f"{NAMESPACE}/inject"  # what to send wrongly, as JSON: topic, kind, count

@@ -16,7 +16,8 @@ from ahv_analysis.errors import GraphError
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.library import fly
 from ahv_analysis.flight.process_per_node import controllers, node_class
-from ahv_msgs_py.node.base_node import REALTIME, BaseNode
+from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.process import DISCOVERY_RANGE
 from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode

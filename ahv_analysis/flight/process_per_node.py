@@ -22,8 +22,9 @@ from ahv_analysis.errors import GraphError
 from ahv_analysis.faults.faulty_node import faulty
 from ahv_analysis.flight.case import Case, config_folder, notes
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.node.base_node import REALTIME, quality
+from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.process import DISCOVERY_RANGE, run
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE

@@ -15,8 +15,8 @@ from rclpy.serialization import deserialize_message
 
 from ahv_analysis.bag.reader import Bag, load_bag, notes_of
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
-from ahv_msgs_py.node.base_node import message_class
 from ahv_msgs_py.node.guard import Guard, Refusal
+from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import DIAGNOSTICS, LOOP_TOPICS, NAMESPACE, LoopTopic

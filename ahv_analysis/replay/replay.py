@@ -32,9 +32,11 @@ from ahv_analysis.flight.process_per_node import node_class
 from ahv_analysis.replay.inputs import LEARNER_NODE, Change, Recording
 from ahv_analysis.replay.result import Comparison, compare
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.node.base_node import BaseNode, message_class, quality
+from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.process import DISCOVERY_RANGE
+from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import (

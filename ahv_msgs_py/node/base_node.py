@@ -1,78 +1,36 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""The shell that all nodes share: lifecycle, parameters, guarded topics as exact bytes, health."""
+"""The shell that all nodes share: guarded topics as exact bytes, and the node's health."""
 
 import gc
 import inspect
 import time
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib import import_module
 from typing import Any
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
-from rclpy.task import Future
+from rclpy.qos import QoSProfile
 
-from ahv_msgs_py.layout import NANOSECONDS, MessageError
+from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.guard import Guard, Refusal
 from ahv_msgs_py.node.health import ERROR, OK, WARN, Health
+from ahv_msgs_py.node.managed_node import ManagedNode
+from ahv_msgs_py.node.messages import diagnostics, general_reader, message_class
+from ahv_msgs_py.node.quality import REALTIME_DEPTH, SENDER_DEPTH, quality
 from ahv_msgs_py.node.real_time import reserve_memory
 from ahv_msgs_py.node.synchronizer import Fallback, RealTimeSteps, Stepwise, Values
-from ahv_msgs_py.parameters import (
-    SHARED,
-    Parameter,
-    ParameterError,
-    Value,
-    check_parameters,
-)
-from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE, QUEUE_DEPTH, STATE, LoopTopic
+from ahv_msgs_py.parameters import Parameter, Value
+from ahv_msgs_py.topics import DIAGNOSTICS, QUEUE_DEPTH, STATE, LoopTopic
 
-REALTIME = Parameter("realtime", False, "100 Hz by the wall clock; if false, lockstep")
-AUTOSTART = Parameter("autostart", True, "configure and activate when started as a process")
-SHELL_PARAMETERS = (REALTIME, AUTOSTART)
-REALTIME_DEPTH = 10  # messages kept by a receiver in real time: older ones would not be obeyed
-SENDER_DEPTH = 1000  # and by a sender there, for a receiver that is slow, as a recorder
 STATE_LOST_AFTER = 500_000_000  # [ns]
 
 
-def quality(durable: bool, depth: int = QUEUE_DEPTH) -> QoSProfile:
-    """Reliable quality of service; `durable` gives a node that joins late what it missed."""
-    local = DurabilityPolicy.TRANSIENT_LOCAL if durable else DurabilityPolicy.VOLATILE
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=local,
-    )
-
-
-def message_class(type_name: str) -> Any:
-    """Class of a message type like `sensor_msgs/msg/JointState`; ModuleNotFoundError if none."""
-    package, _, name = type_name.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
-
-
-class BaseNode(LifecycleNode):
-    """A node of the graph, without its law: a managed node by the standard lifecycle.
-
-    A subclass fills in `prepare`, which makes the law from the settings (on configure, and when
-    parameters change in flight), and `start`, which opens the topics (on activate; what it opened
-    is closed on deactivate). `finished` is the future that ends the process.
-    """
+class BaseNode(ManagedNode):
+    """A node of the graph, without its law."""
 
     def __init__(
         self,
@@ -81,123 +39,22 @@ class BaseNode(LifecycleNode):
         values: Mapping[str, Value] | None = None,
         context: rclpy.Context | None = None,
     ):
-        """`values` overrides parameters, as a YAML file of `--params-file` does.
-
-        Parameters that do not fit are refused by name when the node is configured.
-        """
-        overrides = [RosParameter(key, value=value) for key, value in (values or {}).items()]
-        super().__init__(
-            name,
-            namespace=NAMESPACE,
-            context=context,
-            parameter_overrides=overrides,
-            automatically_declare_parameters_from_overrides=True,
-            start_parameter_services=True,
-        )
-        self.finished = Future(executor=None)
-        self.refusal = ""  # why the node could not be configured
-        self.settings: dict[str, Value] = {}
-        self._known = {entry.name: entry for entry in (*parameters, *SHELL_PARAMETERS)}
-        try:
-            self.settings = self._declare(name)
-        except ParameterError as error:
-            self.refusal = str(error)
-        self.realtime = bool(self.settings.get(REALTIME.name))
+        """`values` overrides parameters."""
+        super().__init__(name, parameters, values, context)
         self.sender_depth = SENDER_DEPTH if self.realtime else QUEUE_DEPTH
         self.now: int | None = None  # [ns] stamp of the newest state
         self.health = Health(time.monotonic_ns)
         self._state_heard = 0  # [ns] by the steady clock
         self._state_lost = False
-        self._judges: list[Guard] = []
-        self._opened: list[Callable[[], object]] = []  # closes what `start` opened
-        self._changed: dict[str, Value] = {}  # in flight, not yet in force
+        self._input_guards: list[Guard] = []
         self._diagnostics = self.create_publisher(
             DiagnosticArray, DIAGNOSTICS.name, quality(True, self.sender_depth)
         )
-        self.add_on_set_parameters_callback(self._change)
-        # an impossible transition is answered with a refusal; rclpy would end the process
-        self._service_change_state.callback = partial(
-            self._change_state, self._service_change_state.callback
-        )
-
-    # Parameters
-
-    def _declare(self, name: str) -> dict[str, Value]:
-        """Check the given parameters, then declare them all with description, unit and range."""
-        ignored = {"use_sim_time", "start_type_description_service", *SHARED} - {*self._known}
-        given = {
-            key: parameter.value
-            for key, parameter in self.get_parameters_by_prefix("").items()
-            if key not in ignored and not key.startswith("qos_overrides.")
-        }
-        values = check_parameters(name, self._known.values(), given)
-        for parameter in self._known.values():
-            if self.has_parameter(parameter.name):
-                self.undeclare_parameter(parameter.name)
-            descriptor = ParameterDescriptor(
-                description=f"{parameter.description} [{parameter.unit or '-'}]",
-                read_only=not parameter.in_flight,
-            )
-            if parameter.minimum is not None and parameter.maximum is not None:
-                if isinstance(parameter.default, float):
-                    bounds = FloatingPointRange(
-                        from_value=parameter.minimum, to_value=parameter.maximum
-                    )
-                    descriptor.floating_point_range = [bounds]
-                else:
-                    limits = IntegerRange(
-                        from_value=int(parameter.minimum), to_value=int(parameter.maximum)
-                    )
-                    descriptor.integer_range = [limits]
-            self.declare_parameter(
-                parameter.name, values[parameter.name], descriptor, ignore_override=True
-            )
-        return values
-
-    def _change(self, parameters: Sequence[RosParameter]) -> SetParametersResult:
-        """Take parameters that change in flight; they are in force from the next step on."""
-        own = [entry for entry in parameters if entry.name in self._known and self.settings]
-        try:
-            given = {
-                entry.name: self._known[entry.name].check(self.get_name(), entry.value)
-                for entry in own
-            }
-            if given:
-                self.prepare(self.settings | given)
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        self.settings |= given
-        self._changed |= given
-        return SetParametersResult(successful=True)
 
     # Lifecycle
 
-    def prepare(self, settings: dict[str, Value]) -> None:
-        """Make the law from checked settings; ParameterError if they do not go together."""
-
-    def start(self) -> None:
-        """Open the topics and start from the beginning."""
-
-    def bring_up(self) -> None:
-        """Configure and activate at once; ParameterError if the node cannot be configured."""
-        for trigger in (self.trigger_configure, self.trigger_activate):
-            if trigger() != TransitionCallbackReturn.SUCCESS:
-                raise ParameterError(self.refusal or f"{self.get_name()} could not be started")
-
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make the law; refuse bad parameters in one sentence."""
-        return self._transition(self._configure)
-
-    def _configure(self) -> None:
-        if not self.settings:
-            raise ParameterError(self.refusal)
-        self.prepare(self.settings)
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Open the topics."""
-        return self._transition(self._activate)
-
-    def _activate(self) -> None:
+    def activate(self) -> None:
+        """Open the topics and start from the beginning, in real time with memory at hand."""
         self.now = None
         if self.realtime:
             timer = self.create_timer(1.0, self._watch)
@@ -206,44 +63,12 @@ class BaseNode(LifecycleNode):
             gc.collect()
             gc.freeze()  # what lives until the end need not be looked at again
             gc.disable()  # from here on `_watch` collects, between two steps
-        self.start()
+        super().activate()
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Close the topics."""
-        return self._transition(self._close)
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """End the node."""
-        if not self.finished.done():
-            self.finished.set_result("")
-        return self._transition(self._close)
-
-    def _close(self) -> None:
-        while self._opened:
-            self._opened.pop()()
-        self._judges.clear()
-
-    def _transition(self, work: Callable[[], None]) -> TransitionCallbackReturn:
-        """Do the work of a transition; rclpy would swallow what it raises."""
-        try:
-            work()
-        except ParameterError as error:
-            self.refusal = str(error)
-            self.get_logger().error(self.refusal)
-            return TransitionCallbackReturn.FAILURE
-        except Exception:
-            self.refusal = traceback.format_exc()
-            self.get_logger().error(self.refusal)
-            return TransitionCallbackReturn.ERROR
-        return TransitionCallbackReturn.SUCCESS
-
-    def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
-        try:
-            return change(request, response)
-        except rclpy._rclpy_pybind11.RCLError as error:
-            self.get_logger().warning(f"impossible transition: {str(error).splitlines()[0]}")
-            response.success = False
-            return response
+    def close(self) -> None:
+        """Close what was opened."""
+        super().close()
+        self._input_guards.clear()
 
     # Topics
 
@@ -292,17 +117,11 @@ class BaseNode(LifecycleNode):
     def receive(self, topic: LoopTopic, handle: Callable[[int, Values], None]) -> None:
         """Subscribe to a loop topic; `handle(stamp, values)` gets every message that is obeyed."""
         message_type = message_class(topic.layout.type_name)
-
-        def general(data: bytes) -> tuple[int, Values]:
-            try:
-                message = deserialize_message(data, message_type)
-            except rclpy._rclpy_pybind11.RMWError as error:
-                raise MessageError("the bytes are no message of the topic's type") from error
-            return topic.layout.values_of(message)
-
         publishers = partial(self.count_publishers, topic.name)
-        guard = Guard(topic, general, time.monotonic_ns, self.realtime, publishers)
-        self._judges.append(guard)
+        guard = Guard(
+            topic, general_reader(topic.layout), time.monotonic_ns, self.realtime, publishers
+        )
+        self._input_guards.append(guard)
         judge = guard.read
         paces = topic is STATE
 
@@ -333,7 +152,7 @@ class BaseNode(LifecycleNode):
             self._state_heard = time.monotonic_ns()
             self._state_lost = False
         if self.now is not None and stamp <= self.now:
-            for other in self._judges:
+            for other in self._input_guards:
                 if other is not guard:
                     other.forget()
             self.new_flight()
@@ -396,16 +215,8 @@ class BaseNode(LifecycleNode):
 
     def announce(self, stamp: int, level: bytes, text: str, **facts: object) -> None:
         """Publish a diagnostic status at `stamp` [ns]."""
-        status = DiagnosticStatus(
-            level=level,
-            name=self.get_fully_qualified_name(),
-            message=text,
-            hardware_id="ahv",
-            values=[KeyValue(key=key, value=str(value)) for key, value in facts.items()],
-        )
-        message = DiagnosticArray(status=[status])
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
-        self._diagnostics.publish(message)
+        name = self.get_fully_qualified_name()
+        self._diagnostics.publish(diagnostics(stamp, name, level, text, facts))
 
     def report_health(self, stamp: int) -> None:
         """Publish what happened since the last report."""

@@ -11,7 +11,8 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from ahv_msgs_py.node.base_node import AUTOSTART, BaseNode
+from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.managed_node import AUTOSTART
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import ParameterError
 

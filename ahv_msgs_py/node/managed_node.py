@@ -1,0 +1,153 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A managed node by the standard lifecycle, set up by checked parameters."""
+
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.task import Future
+
+from ahv_msgs_py.node.ros_parameters import declare_parameters
+from ahv_msgs_py.parameters import Parameter, ParameterError, Value
+from ahv_msgs_py.topics import NAMESPACE
+
+REALTIME = Parameter("realtime", False, "100 Hz by the wall clock; if false, lockstep")
+AUTOSTART = Parameter("autostart", True, "configure and activate when started as a process")
+SHELL_PARAMETERS = (REALTIME, AUTOSTART)
+
+
+class ManagedNode(LifecycleNode):
+    """A node with its parameters and its lifecycle, without topics.
+
+    A subclass fills in `prepare`, which makes the law from the settings (on configure, and when
+    parameters change in flight), and `start`, which opens the topics (on activate; what it opened
+    is closed on deactivate). `finished` is the future that ends the process.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        parameters: Sequence[Parameter],
+        values: Mapping[str, Value] | None = None,
+        context: rclpy.Context | None = None,
+    ):
+        """`values` overrides parameters, as a YAML file of `--params-file` does.
+
+        Parameters that do not fit are refused by name when the node is configured.
+        """
+        overrides = [RosParameter(key, value=value) for key, value in (values or {}).items()]
+        super().__init__(
+            name,
+            namespace=NAMESPACE,
+            context=context,
+            parameter_overrides=overrides,
+            automatically_declare_parameters_from_overrides=True,
+            start_parameter_services=True,
+        )
+        self.finished = Future(executor=None)
+        self.refusal = ""  # why the node could not be configured
+        self.settings: dict[str, Value] = {}
+        self._known = {entry.name: entry for entry in (*parameters, *SHELL_PARAMETERS)}
+        try:
+            self.settings = declare_parameters(self, self._known)
+        except ParameterError as error:
+            self.refusal = str(error)
+        self.realtime = bool(self.settings.get(REALTIME.name))
+        self._opened: list[Callable[[], object]] = []  # closes what `start` opened
+        self._changed: dict[str, Value] = {}  # in flight, not yet in force
+        self.add_on_set_parameters_callback(self._change)
+        # an impossible transition is answered with a refusal; rclpy would end the process
+        self._service_change_state.callback = partial(
+            self._change_state, self._service_change_state.callback
+        )
+
+    # Parameters
+
+    def _change(self, parameters: Sequence[RosParameter]) -> SetParametersResult:
+        """Take parameters that change in flight; they are in force from the next step on."""
+        own = [entry for entry in parameters if entry.name in self._known and self.settings]
+        try:
+            given = {
+                entry.name: self._known[entry.name].check(self.get_name(), entry.value)
+                for entry in own
+            }
+            if given:
+                self.prepare(self.settings | given)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self.settings |= given
+        self._changed |= given
+        return SetParametersResult(successful=True)
+
+    # Lifecycle
+
+    def prepare(self, settings: dict[str, Value]) -> None:
+        """Make the law from checked settings; ParameterError if they do not go together."""
+
+    def start(self) -> None:
+        """Open the topics and start from the beginning."""
+
+    def bring_up(self) -> None:
+        """Configure and activate at once; ParameterError if the node cannot be configured."""
+        for trigger in (self.trigger_configure, self.trigger_activate):
+            if trigger() != TransitionCallbackReturn.SUCCESS:
+                raise ParameterError(self.refusal or f"{self.get_name()} could not be started")
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make the law; refuse bad parameters in one sentence."""
+        return self._transition(self._configure)
+
+    def _configure(self) -> None:
+        if not self.settings:
+            raise ParameterError(self.refusal)
+        self.prepare(self.settings)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Open the topics."""
+        return self._transition(self.activate)
+
+    def activate(self) -> None:
+        """Do the work of activation."""
+        self.start()
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the topics."""
+        return self._transition(self.close)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End the node."""
+        if not self.finished.done():
+            self.finished.set_result("")
+        return self._transition(self.close)
+
+    def close(self) -> None:
+        """Close what was opened."""
+        while self._opened:
+            self._opened.pop()()
+
+    def _transition(self, work: Callable[[], None]) -> TransitionCallbackReturn:
+        """Do the work of a transition; rclpy would swallow what it raises."""
+        try:
+            work()
+        except ParameterError as error:
+            self.refusal = str(error)
+            self.get_logger().error(self.refusal)
+            return TransitionCallbackReturn.FAILURE
+        except Exception:
+            self.refusal = traceback.format_exc()
+            self.get_logger().error(self.refusal)
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        try:
+            return change(request, response)
+        except rclpy._rclpy_pybind11.RCLError as error:
+            self.get_logger().warning(f"impossible transition: {str(error).splitlines()[0]}")
+            response.success = False
+            return response

@@ -1,0 +1,44 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Our parameters as those of a ROS node: declared with description, unit and range."""
+
+from collections.abc import Mapping
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from ahv_msgs_py.parameters import SHARED, Parameter, Value, check_parameters
+
+
+def declare_parameters(node: Node, known: Mapping[str, Parameter]) -> dict[str, Value]:
+    """Check what `node` was given, then declare all it knows; ParameterError if it is wrong."""
+    ignored = {"use_sim_time", "start_type_description_service", *SHARED} - {*known}
+    given = {
+        key: parameter.value
+        for key, parameter in node.get_parameters_by_prefix("").items()
+        if key not in ignored and not key.startswith("qos_overrides.")
+    }
+    values = check_parameters(node.get_name(), known.values(), given)
+    for parameter in known.values():
+        if node.has_parameter(parameter.name):
+            node.undeclare_parameter(parameter.name)
+        node.declare_parameter(
+            parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
+        )
+    return values
+
+
+def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+    """Description, unit and range, as `ros2 param describe` shows them."""
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.description} [{parameter.unit or '-'}]",
+        read_only=not parameter.in_flight,
+    )
+    low, high = parameter.minimum, parameter.maximum
+    if low is not None and high is not None:
+        if isinstance(parameter.default, float):
+            bounds = FloatingPointRange(from_value=low, to_value=high)
+            descriptor.floating_point_range = [bounds]
+        else:
+            limits = IntegerRange(from_value=int(low), to_value=int(high))
+            descriptor.integer_range = [limits]
+    return descriptor
