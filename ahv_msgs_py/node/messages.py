@@ -19,7 +19,10 @@ def message_class(type_name: str) -> Any:
 
 
 def general_reader(layout: Layout) -> Callable[[bytes], tuple[int, tuple[float, ...]]]:
-    """Return what reads a message of the topic's type, but of another layout than ours."""
+    """Return what reads a message of the topic's type, but of another layout than ours.
+
+    It gives the stamp [ns] and the values, in their units; MessageError if the bytes are none.
+    """
     message_type = message_class(layout.type_name)
 
     def read(data: bytes) -> tuple[int, tuple[float, ...]]:
