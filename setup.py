@@ -1,20 +1,25 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Package `ahv`: built by colcon as ament_python, and by pip into a virtual environment."""
 
+import runpy
 import sys
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "ahv"
-NODES = {
-    "plant": "ahv_plant.plant_node",
-    "outer_intermediate": "ahv_control.outer_intermediate_node",
-    "disturbance_learner": "ahv_control.disturbance_learner_node",
-    "inner_loop": "ahv_control.inner_loop_node",
-    "velocity": "ahv_control.velocity_node",
-    "recorder": "ahv_analysis.bag.recorder_node",
-}
+# by its path: what the package imports may not be installed yet
+NODES = runpy.run_path("ahv_msgs_py/graph.py")["NODES"]
+LAUNCHER = """#!/bin/sh
+# Where `ros2 run` looks in a pip installation; colcon puts the program itself here.
+exec "$(dirname "$0")/../../bin/{program}" "$@"
+"""
+# The commands and their functions. Those of pip lie in bin/, among everybody's, and have a prefix;
+# those of colcon lie in lib/ahv, where `ros2 run` looks.
+PIP = {"dist_info", "bdist_wheel", "editable_wheel"} & {*sys.argv}
+PROGRAMS = {"ahv": ("ahv", "ahv_analysis.command.main")}
+PROGRAMS |= {name: (f"ahv-{name}" if PIP else name, node.module) for name, node in NODES.items()}
 DATA = [
     ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
     (f"share/{NAME}", ["package.xml"]),
@@ -22,8 +27,12 @@ DATA = [
     (f"share/{NAME}/launch", glob("launch/*.launch.py")),
 ]
 if "bdist_wheel" in sys.argv:
-    # `ros2 run` looks in lib/ahv: pip puts launchers there, colcon the nodes themselves
-    DATA.append((f"lib/{NAME}", [f"resource/nodes/{node}" for node in NODES]))
+    launchers = Path("build", "launchers")
+    launchers.mkdir(parents=True, exist_ok=True)
+    for executable, (program, _) in PROGRAMS.items():
+        (launchers / executable).write_text(LAUNCHER.format(program=program))
+        (launchers / executable).chmod(0o755)
+    DATA.append((f"lib/{NAME}", [str(launchers / executable) for executable in PROGRAMS]))
 
 setup(
     name=NAME,
@@ -79,10 +88,7 @@ setup(
         ],
     },
     entry_points={
-        "console_scripts": [
-            "ahv = ahv_analysis.command.main:main",
-            *(f"{name} = {module}:main" for name, module in NODES.items()),
-        ]
+        "console_scripts": [f"{program} = {module}:main" for program, module in PROGRAMS.values()]
     },
     zip_safe=True,
 )

@@ -9,39 +9,15 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from ahv_analysis.bag.recorder_node import RECORDER_PARAMETERS
-from ahv_analysis.flight.case import NODES
+from ahv_msgs_py.graph import NODES, listeners, sender
 from ahv_msgs_py.node.faults import fault_rows
 from ahv_msgs_py.node.managed_node import SHELL_PARAMETERS
 from ahv_msgs_py.parameters import Parameter, Value
-from ahv_msgs_py.topics import (
-    ATTITUDE_COMMAND,
-    DISTURBANCE_ESTIMATE,
-    FINITE,
-    LEARNER,
-    LOOP_TOPICS,
-    RATE_COMMAND,
-    STATE,
-    SURFACE_COMMAND,
-    THROTTLE_COMMAND,
-    VIEWER_TOPICS,
-    LoopTopic,
-)
+from ahv_msgs_py.topics import BY_NAME, FINITE, LOOP_TOPICS, VIEWER_TOPICS, LoopTopic
 
 ROOT = Path(__file__).resolve().parent.parent
 MARKED = re.compile(r"(?<=<!-- reference )(\w+)( -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
-# Which node sends a topic of the loop, and which listen; the recorder listens to all.
-ROUTES: dict[LoopTopic, tuple[str, tuple[str, ...]]] = {
-    STATE: ("plant", ("outer_intermediate", "disturbance_learner", "inner_loop", "velocity")),
-    ATTITUDE_COMMAND: ("outer_intermediate", ()),
-    RATE_COMMAND: ("outer_intermediate", ("disturbance_learner", "inner_loop")),
-    DISTURBANCE_ESTIMATE: ("disturbance_learner", ("inner_loop",)),
-    LEARNER: ("disturbance_learner", ("inner_loop",)),
-    SURFACE_COMMAND: ("inner_loop", ("plant", "velocity", "disturbance_learner")),
-    THROTTLE_COMMAND: ("velocity", ("plant",)),
-}
-ADAPTIVE = "disturbance_learner"  # flies in adaptive cases only
 PLACES = {
     "geometry_msgs/msg/Vector3Stamped": [f"vector.{axis}" for axis in "xyz"],
     "geometry_msgs/msg/AccelStamped": [
@@ -59,11 +35,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 def graph() -> str:
     """Mermaid flowchart of the control loop, dashed what adaptive cases add."""
     lines = ["```mermaid", "flowchart LR"]
-    for topic, (sender, listeners) in ROUTES.items():
-        label = topic.name.rpartition("/")[2]
-        for listener in listeners:
-            arrow = "-. {} .->" if ADAPTIVE in (sender, listener) else "-- {} -->"
-            lines.append(f"    {sender} {arrow.format(label)} {listener}")
+    for topic in BY_NAME:
+        speaker = sender(topic)
+        for listener in listeners(topic):
+            dashed = NODES[speaker].adaptive or NODES[listener].adaptive
+            arrow = f"-. {topic} .->" if dashed else f"-- {topic} -->"
+            lines.append(f"    {speaker} {arrow} {listener}")
     return "\n".join(lines) + "\n```\n"
 
 
@@ -74,10 +51,10 @@ def loop_topics() -> str:
             f"`{topic.name}`",
             topic.layout.type_name.replace("/msg/", "/"),
             f"`{topic.layout.frame}`",
-            ROUTES[topic][0],
-            ", ".join(ROUTES[topic][1]),
+            sender(name),
+            ", ".join(listeners(name)),
         )
-        for topic in LOOP_TOPICS
+        for name, topic in BY_NAME.items()
     )
     parts = [table(("topic", "type", "frame", "from", "to"), rows)]
     parts += (
@@ -117,7 +94,8 @@ def viewer_topics() -> str:
 def parameters() -> str:
     """Table of the parameters of every node, first those that all have."""
     head = ("parameter", "default", "unit", "range", "in flight", "meaning")
-    rooms = {"every node": SHELL_PARAMETERS, **NODES, "recorder": RECORDER_PARAMETERS}
+    rooms = {"every node": SHELL_PARAMETERS}
+    rooms |= {name: node.parameters for name, node in NODES.items()}
     return "\n".join(
         f"## {node}\n\n{table(head, map(_parameter, known))}" for node, known in rooms.items()
     )

@@ -108,6 +108,7 @@ LEARNER = LoopTopic(
 )
 LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)
 LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS
+BY_NAME = {topic.name.rpartition("/")[2]: topic for topic in LOOP_TOPICS}  # as the graph has them
 
 CLOCK = ViewerTopic("/clock", "rosgraph_msgs/msg/Clock", 4, "simulated time at 100 Hz")
 ODOMETRY = ViewerTopic(

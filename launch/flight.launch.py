@@ -18,8 +18,8 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown, Time
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-CONTROLLERS = ("outer_intermediate", "inner_loop", "velocity")
-LEARNER = "disturbance_learner"  # flies with the cases whose inner loop is adaptive
+from ahv_msgs_py.graph import controllers
+
 DRAIN = 2.0  # [s] for the recorder to take what is still under way
 ARGUMENTS = {
     "case": ("nominal_di", "Name of a case in share/ahv/config/cases, or path of a YAML file."),
@@ -45,9 +45,9 @@ def _nodes(context: LaunchContext) -> list[Node]:
     case = _case_file(given["case"])
     realtime, record = _truth(given, "realtime"), _truth(given, "record")
     shell = {"realtime": realtime, "autostart": _truth(given, "autostart")}
-    controllers = (*CONTROLLERS, LEARNER) if _adaptive(case) else CONTROLLERS
+    names = controllers(_adaptive(case))
     plant = [_file(given["dispersion"])] if given["dispersion"] else []
-    plant += [shell | {"listeners": len(controllers) + record}]
+    plant += [shell | {"listeners": len(names) + record}]
     bag = str(Path(given["out"]).expanduser().resolve() / "bag")
     over = TimerAction(period=DRAIN, actions=[Shutdown(reason="the flight is over")])
     nodes = []
@@ -55,7 +55,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
         # in real time a flight goes on without its recorder
         end = {} if realtime else {"on_exit": Shutdown(reason="the recorder ended")}
         nodes += [_node("recorder", [case, shell | {"bag": bag}], **end)]
-    for name in controllers:
+    for name in names:
         end = {"respawn": True} if realtime else {"on_exit": Shutdown(reason=f"{name} ended")}
         nodes += [_node(name, [case, shell], **end)]
     return [*nodes, _node("plant", [case, *plant], on_exit=over)]

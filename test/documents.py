@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 
+from ahv_msgs_py.graph import NODES
+
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(
     page for where in ("*.md", "docs/*.md", "examples/**/*.md") for page in ROOT.glob(where)
@@ -20,7 +22,7 @@ PAGES = sorted(
 SLOW = "<!-- slow -->"  # above a block that takes minutes
 SHELL = ("", "sh")  # a block that does not say its language is one of commands
 ELSEWHERE = ("colcon", "git", "plotjuggler", "ros2", "rosdep", "sudo")  # on another machine
-NODES = [path.name for path in (ROOT / "resource" / "nodes").iterdir()]
+TERMINALS = {f"ahv-{name}" for name in NODES}  # each of these runs in one of its own
 SETTING = re.compile(r"[A-Z_]+=")  # of an environment variable, before a program
 LONGEST = 1800  # [s], for `make bench`
 
@@ -105,7 +107,7 @@ def run(block: Block, folder: Path, domain: int) -> None:
     }
     program = ["bash", "-euo", "pipefail"] if block.language in SHELL else ["python"]
     first_words = set(map(first_word, block.commands))
-    if block.language in SHELL and first_words & set(NODES):
+    if block.language in SHELL and first_words & TERMINALS:
         run_in_terminals(block.commands, folder, environment)
     elif not (block.language in SHELL and first_words & set(ELSEWHERE)):
         done = subprocess.run(
@@ -130,7 +132,7 @@ def run_in_terminals(commands: list[str], folder: Path, environment: dict[str, s
     }
     try:
         for command, terminal in terminals.items():
-            if first_word(command) in ("plant", "recorder"):
+            if first_word(command) in ("ahv-plant", "ahv-recorder"):
                 assert terminal.wait(LONGEST) == 0, command
         for command, terminal in terminals.items():
             assert terminal.poll() in (None, 0), command

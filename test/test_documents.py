@@ -16,13 +16,14 @@ import typer
 import yaml
 
 from ahv_analysis.command.main import app
+from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 from test.documents import (
     ELSEWHERE,
-    NODES,
     PAGES,
     ROOT,
     SHELL,
+    TERMINALS,
     blocks,
     clone,
     first_word,
@@ -43,7 +44,7 @@ COMMANDS |= {
     for page in PAGES
 }
 TARGETS = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-PROGRAMS = (*ELSEWHERE, *NODES, ".", "ahv", "export", "make", "python", "timeout")
+PROGRAMS = (*ELSEWHERE, *TERMINALS, ".", "ahv", "export", "make", "python", "timeout")
 by_name = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 
 
@@ -73,7 +74,7 @@ def check_ros2(words):
         for name in (word.partition(":=")[0] for word in words[3:] if ":=" in word):
             assert f'"{name}"' in file, name
     elif words[:2] == ["run", "ahv"]:
-        assert words[2] in NODES or words[2].isupper(), words[2]
+        assert words[2] in (*NODES, "ahv") or words[2].isupper(), words[2]
     topics = [topic.name for topic in (*LOOP_TOPICS, *VIEWER_TOPICS)]
     for name in (word for word in words if word.startswith("/ahv/")):
         assert name in topics or name.removeprefix("/ahv/") in NODES, name

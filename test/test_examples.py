@@ -23,11 +23,11 @@ def test_an_inner_loop_of_ones_own_flies_the_plant_as_well_as_ours(tmp_path, dom
     case = f"--ros-args --params-file {ROOT / 'config' / 'cases' / 'nominal_di.yaml'}"
     mine = EXAMPLES / "my_inner_loop" / "my_inner_loop" / "my_inner_loop.py"
     terminals = [
-        f"recorder --ros-args -p bag:={tmp_path / 'bag'}",
-        f"outer_intermediate {case}",
-        f"velocity {case}",
+        f"ahv-recorder --ros-args -p bag:={tmp_path / 'bag'}",
+        f"ahv-outer_intermediate {case}",
+        f"ahv-velocity {case}",
         f"python {mine}",
-        f"plant {case} -p listeners:=4 -p duration:={DURATION}",
+        f"ahv-plant {case} -p listeners:=4 -p duration:={DURATION}",
     ]
     programs = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     environment = os.environ | {"PATH": programs, "ROS_DOMAIN_ID": str(domain)}

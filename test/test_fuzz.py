@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.flight.case import load_case
-from ahv_analysis.flight.process_per_node import node_class
+from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.layout import NamedVector
 from ahv_msgs_py.node.faults import PERIOD, Fault
 from ahv_msgs_py.node.messages import message_class
@@ -112,7 +112,7 @@ class Fuzzed:
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain)
         values = CASE.parameters[name] | ({"listeners": 1} if name == "plant" else {})
-        self.node = node_class(name)(values, self.context)
+        self.node = NODES[name].node_class(values, self.context)
         self.node.bring_up()
         self.sender = rclpy.create_node("sender", context=self.context)
         self.publisher = self.sender.create_publisher(

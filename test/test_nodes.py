@@ -15,7 +15,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.flight.case import load_case
-from ahv_analysis.flight.process_per_node import NODES, controllers, node_class
+from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import SENDER_DEPTH
 from ahv_msgs_py.parameters import ParameterError
@@ -34,7 +34,7 @@ class Graph:
         self.client = rclpy.create_node("client", context=self.context)
         given = CASE.parameters | {"recorder": {}}
         self.nodes = {
-            name: node_class(name)(given[name] | values.get(name, {}), self.context)
+            name: NODES[name].node_class(given[name] | values.get(name, {}), self.context)
             for name in names
         }
         for node in (*self.nodes.values(), self.client):
@@ -150,7 +150,7 @@ def test_an_impossible_transition_is_refused_and_changes_nothing(graph):
 
 
 def test_an_inactive_node_does_not_answer(graph):
-    flown = graph(*controllers(CASE), "plant", plant={"listeners": 5})
+    flown = graph(*CASE.controllers, "plant", plant={"listeners": 5})
     flown.listen()
     for node in flown.nodes.values():
         node.trigger_configure()

@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The package installs by pip and by colcon alike: executables, index, cases, launch file."""
 
-import os
 import runpy
 import shutil
 import subprocess
@@ -15,23 +14,32 @@ from xml.etree import ElementTree
 
 import pytest
 
-from ahv_analysis.flight.case import case_names
+from ahv_analysis.flight.case import case_names, load_case
+from ahv_msgs_py.graph import NODES, controllers
 from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 
 ROOT = Path(__file__).parent.parent
-CONTROLLERS = ["outer_intermediate", "inner_loop", "velocity"]
 BUILT_FROM = ("package.xml", "setup.py", "setup.cfg", "pyproject.toml", "README.md", "LICENSE")
 BUILDS_WHEELS = find_spec("setuptools.command.bdist_wheel") or find_spec("wheel")
 
 
-@pytest.fixture
-def setup(monkeypatch):
-    """What setup.py hands to setuptools."""
+CONTROLLERS = controllers(adaptive=False)
+
+
+def handed_over(monkeypatch, folder, command):
+    """What setup.py in `folder` hands to setuptools when it is called with a command."""
     given = {}
-    monkeypatch.chdir(ROOT)
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("sys.argv", ["setup.py", command])
     monkeypatch.setattr("setuptools.setup", lambda **options: given.update(options))
     runpy.run_path("setup.py")
     return given
+
+
+@pytest.fixture
+def setup(monkeypatch):
+    """What setup.py hands to setuptools for colcon."""
+    return handed_over(monkeypatch, ROOT, "install")
 
 
 @pytest.fixture
@@ -45,25 +53,28 @@ def executables(setup):
 
 def test_every_executable_is_a_function(setup):
     names = executables(setup)
-    assert {"ahv", "plant", "recorder", *CONTROLLERS} <= set(names)
+    assert set(names) == {"ahv", *NODES}
     for target in names.values():
         module, function = target.split(":")
         assert callable(getattr(import_module(module), function))
 
 
-def test_every_node_has_a_launcher(setup):
-    launchers = {path.name: path for path in (ROOT / "resource" / "nodes").iterdir()}
-    assert set(launchers) == set(executables(setup)) - {"ahv"}
-    for path in launchers.values():
-        assert os.access(path, os.X_OK), path
-        assert path.read_text() == launchers["plant"].read_text()
+@pytest.mark.parametrize("command", ["dist_info", "bdist_wheel", "editable_wheel"])
+def test_programs_of_pip_lie_among_those_of_others_and_have_a_prefix(
+    monkeypatch, sources, command
+):
+    names = set(executables(handed_over(monkeypatch, sources, command)))
+    assert names == {"ahv", *(f"ahv-{name}" for name in NODES)}
 
 
-def test_launcher_becomes_the_program_of_its_name(tmp_path):
-    launcher, program = tmp_path / "lib" / "ahv" / "plant", tmp_path / "bin" / "plant"
+def test_launcher_becomes_the_program_of_its_name(monkeypatch, sources, tmp_path):
+    data = dict(handed_over(monkeypatch, sources, "bdist_wheel")["data_files"])
+    launchers = {Path(path).name: path for path in data["lib/ahv"]}
+    assert set(launchers) == {"ahv", *NODES}
+    launcher, program = tmp_path / "lib" / "ahv" / "plant", tmp_path / "bin" / "ahv-plant"
     for path in (launcher, program):
         path.parent.mkdir(parents=True)
-    shutil.copy(ROOT / "resource" / "nodes" / "plant", launcher)
+    shutil.copy(sources / launchers["plant"], launcher)
     program.write_text('#!/bin/sh\nprintf "%s," $$ "$@"\nexit 7\n')
     program.chmod(0o755)
     with subprocess.Popen([launcher, "-p", "two words"], stdout=subprocess.PIPE) as process:
@@ -71,28 +82,40 @@ def test_launcher_becomes_the_program_of_its_name(tmp_path):
     assert process.returncode == 7
 
 
-@pytest.mark.skipif(not BUILDS_WHEELS, reason="this setuptools cannot build a wheel")
-def test_wheel_carries_what_ros_looks_for(setup, tmp_path):
+@pytest.fixture
+def sources(setup, tmp_path):
+    """Copy what a build reads: it writes beside it."""
+    folder = tmp_path / "sources"
     packages = {package.partition(".")[0] for package in setup["packages"]}
     for name in (*packages, "config", "launch", "resource"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in BUILT_FROM:
-        shutil.copy(ROOT / name, tmp_path)
+        shutil.copy(ROOT / name, folder)
+    return folder
+
+
+@pytest.mark.skipif(not BUILDS_WHEELS, reason="this setuptools cannot build a wheel")
+def test_wheel_carries_what_ros_looks_for(setup, sources, tmp_path):
     pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index"]
-    subprocess.run([*pip, "--no-build-isolation", "-w", tmp_path, tmp_path], check=True)
+    subprocess.run([*pip, "--no-build-isolation", "-w", tmp_path, sources], check=True)
     (path,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(path) as wheel:
         modes = {info.filename: info.external_attr >> 16 for info in wheel.infolist()}
+        commands = wheel.read(f"ahv-{setup['version']}.dist-info/entry_points.txt").decode()
     data = f"ahv-{setup['version']}.data/data"
-    for node in set(executables(setup)) - {"ahv"}:
+    assert {line.split(" = ")[0] for line in commands.splitlines()[1:] if line} == {
+        "ahv",
+        *(f"ahv-{node}" for node in NODES),
+    }
+    for node in ("ahv", *NODES):
         assert modes[f"{data}/lib/ahv/{node}"] & 0o111 == 0o111
     expected = ["ament_index/resource_index/packages/ahv", "ahv/package.xml"]
     expected += [f"ahv/config/cases/{case}.yaml" for case in case_names()]
     expected += [f"ahv/config/viewers/{path.name}" for path in ROOT.glob("config/viewers/*")]
     expected += ["ahv/launch/flight.launch.py", "ahv/launch/replay.launch.py"]
     assert {f"{data}/share/{name}" for name in expected} <= set(modes)
-    sources = [path for path in ROOT.glob("ahv_*/**/*") if path.is_file()]
-    ours = {str(path.relative_to(ROOT)) for path in sources if path.suffix != ".pyc"}
+    code = [path for path in ROOT.glob("ahv_*/**/*") if path.is_file()]
+    ours = {str(path.relative_to(ROOT)) for path in code if path.suffix != ".pyc"}
     assert ours <= set(modes)
     assert not [name for name in modes if name.startswith("test")]
 
@@ -146,6 +169,34 @@ def launch(monkeypatch):
     return lambda **given: {node.name: node for node in start.function(defaults | given)}
 
 
+ADDED = """    GraphNode(
+        "guidance",
+        "ahv_control.velocity_node",
+        "VelocityNode",
+        "ahv_control.parameters.VELOCITY_PARAMETERS",
+        hears=("state",),
+        sends=("reference",),
+        controller=True,
+    ),
+"""
+
+
+def test_one_entry_adds_a_node_to_all_that_start_nodes(monkeypatch, launch, sources, tmp_path):
+    graph = sources / "ahv_msgs_py" / "graph.py"
+    graph.write_text(graph.read_text().replace("_NODES = (\n", f"_NODES = (\n{ADDED}"))
+    given = handed_over(monkeypatch, sources, "bdist_wheel")
+    assert executables(given)["ahv-guidance"] == "ahv_control.velocity_node:main"
+    assert "build/launchers/guidance" in dict(given["data_files"])["lib/ahv"]
+    node = runpy.run_path(str(graph))["NODES"]["guidance"]
+    monkeypatch.setitem(NODES, "guidance", node)
+    assert set(launch()) == {"recorder", "plant", "guidance", *CONTROLLERS}
+    case = tmp_path / "case.yaml"
+    case.write_text("/ahv/guidance: {ros__parameters: {speed: 1800.0}}")
+    flown = load_case(str(case))
+    assert "guidance" in flown.controllers
+    assert flown.parameters["guidance"]["speed"] == 1800.0
+
+
 LOCKSTEP = {"realtime": False, "autostart": True}
 
 
@@ -164,7 +215,7 @@ def test_launch_starts_a_process_per_node_from_one_case(launch, setup):
 
 def test_launch_adds_the_learner_to_adaptive_cases(launch):
     nodes = launch(case="neuro_adaptive_di")
-    assert set(nodes) == {"recorder", "plant", "disturbance_learner", *CONTROLLERS}
+    assert set(nodes) == set(NODES)
     assert nodes["plant"].parameters[1:] == [LOCKSTEP | {"listeners": 5}]
 
 

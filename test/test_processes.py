@@ -13,7 +13,13 @@ import pytest
 from ahv_analysis.bag.reader import read_bag
 from ahv_analysis.bag.record import record
 from ahv_analysis.errors import GraphError
-from ahv_analysis.faults.campaign import EXPECTED, NODES, Spectator, draw_injections, run_campaign
+from ahv_analysis.faults.campaign import (
+    CONTROLLERS,
+    EXPECTED,
+    Spectator,
+    draw_injections,
+    run_campaign,
+)
 from ahv_analysis.faults.faulty_node import wrong_messages
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
@@ -122,7 +128,7 @@ def test_every_controller_can_be_killed_and_started_again(tmp_path):
     """Within a second, in flight: the flight comes back to where it would have been."""
     calm = reference(150.0)
     with watched(CASE, 100) as (graph, spectator):
-        for name in NODES:
+        for name in CONTROLLERS:
             spectator.max_abs_alpha = 0.0
             graph.kill(name)
             graph.start(name)

@@ -8,8 +8,9 @@ import rclpy
 
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.one_process import fly_graph
-from ahv_analysis.reference import MARKED, PARTS, ROUTES, filled
-from ahv_msgs_py.topics import LOOP_TOPICS, QUEUE_DEPTH
+from ahv_analysis.reference import MARKED, PARTS, filled
+from ahv_msgs_py.graph import listeners, sender
+from ahv_msgs_py.topics import BY_NAME, LOOP_TOPICS, QUEUE_DEPTH
 
 ROOT = Path(__file__).parent.parent
 PAGES = [path for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))]
@@ -51,7 +52,7 @@ def test_the_graph_that_flies_is_the_one_that_is_drawn(domain):
         observer.destroy_node()
         rclpy.shutdown(context=context)
     assert seen == {
-        topic: ({sender}, set(listeners)) for topic, (sender, listeners) in ROUTES.items()
+        topic: ({sender(name)}, set(listeners(name))) for name, topic in BY_NAME.items()
     }
 
 

@@ -25,12 +25,12 @@ from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import case_names, load_case, notes
 from ahv_analysis.flight.library import fly_library
 from ahv_analysis.flight.one_process import fly_graph
-from ahv_analysis.flight.process_per_node import controllers, node_class
 from ahv_analysis.replay.inputs import read_recording
-from ahv_analysis.replay.replay import ANSWERS, replay
+from ahv_analysis.replay.replay import answers, replay
 from ahv_analysis.replay.result import total
 from ahv_control.inner_loop_node import InnerLoopNode
 from ahv_control.outer_intermediate_node import OuterIntermediateNode
+from ahv_msgs_py.graph import NODES, controllers
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import (
@@ -51,7 +51,7 @@ ADAPTIVE = "neuro_adaptive_di_protected"
 
 def again(bag, case, **options):
     """Totals of a replay of all controllers of a case."""
-    flown = replay(read_recording(bag), case, controllers(case), **options)
+    flown = replay(read_recording(bag), case, case.controllers, **options)
     return total(flown.comparisons) | {"skipped": flown.skipped}
 
 
@@ -162,7 +162,7 @@ def test_parameters_changed_in_flight_are_changed_at_the_same_step(tmp_path, dom
     assert [change.stamp for change in recording.changes] == [510_000_000, *[1_240_000_000] * 2]
     assert recording.changes[0].values == climb
     assert again(tmp_path / "bag", case)["differences"] == 0
-    names = controllers(case)
+    names = case.controllers
     first = total(replay(recording._replace(changes=[]), case, names).comparisons)["first"]
     assert (first["node"], first["time_s"]) == ("outer_intermediate", 0.51)
 
@@ -233,7 +233,7 @@ def test_a_bag_of_the_stock_recorder_replays(ahv, bags, tmp_path):
 
 def test_an_adaptive_controller_is_tried_on_a_nominal_flight(bags):
     case = load_case("neuro_adaptive_di")
-    flown = replay(read_recording(bags / "nominal_di"), case, controllers(case))
+    flown = replay(read_recording(bags / "nominal_di"), case, case.controllers)
     by_topic = {entry.topic: entry for entry in flown.comparisons}
     for topic in LEARNER_TOPICS:  # heard by the inner loop, and compared with nothing
         assert len(flown.answers[topic]) == STEPS
@@ -331,17 +331,17 @@ def test_a_replay_to_be_watched_does_not_speak_into_a_flight(bags, neighbour, do
         again(bags / "nominal_di", load_case("nominal_di"), rate=100.0, domain=domain)
 
 
-@pytest.mark.parametrize("name", ANSWERS)
+@pytest.mark.parametrize("name", controllers(adaptive=True))
 def test_nodes_publish_what_a_replay_takes_from_them(name, domain):
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=domain)
-    node = node_class(name)(load_case(ADAPTIVE).parameters[name], context)
+    node = NODES[name].node_class(load_case(ADAPTIVE).parameters[name], context)
     node.bring_up()
     loop = {topic.name for topic in LOOP_TOPICS}
     published = {publisher.topic_name for publisher in node.publishers} & loop
     node.destroy_node()
     rclpy.shutdown(context=context)
-    assert published == {topic.name for topic in ANSWERS[name]}
+    assert published == {topic.name for topic in answers(name)}
 
 
 def test_a_table_for_people(ahv, bags):

@@ -101,9 +101,7 @@ def _case(recording: "Recording", parameters: str | None) -> "Case":
 
 def _names(case: "Case", chosen: list[str] | None) -> list[str]:
     """Controllers to replay, in the order in which they answer a state."""
-    from ahv_analysis.flight.process_per_node import controllers
-
-    valid = controllers(case)
+    valid = case.controllers
     for name in chosen or []:
         if name not in valid:
             raise UsageError(

@@ -23,12 +23,12 @@ from ahv_analysis.flight.process_per_node import (
     Watcher,
     set_transport,
 )
+from ahv_msgs_py.graph import controllers, listeners
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import (
-    DISTURBANCE_ESTIMATE,
-    LEARNER,
+    BY_NAME,
     LOOP_TOPICS,
     RATE_COMMAND,
     STATE,
@@ -45,9 +45,9 @@ LONGEST_OUTAGE = 1.0  # [s] of a node
 LONGEST_LOSS = 0.5  # [s] of a bag whose recorder was killed
 SETTLE = 1.0  # [s] after an injection, in which it must be noticed
 PER_FLIGHT = 75  # injections, so that a flight stays within its 150 s
-NODES = ("outer_intermediate", "disturbance_learner", "inner_loop", "velocity")
-RECEIVED = (STATE, RATE_COMMAND, LEARNER, DISTURBANCE_ESTIMATE, SURFACE_COMMAND, THROTTLE_COMMAND)
-COMMANDS = (RATE_COMMAND, LEARNER, DISTURBANCE_ESTIMATE, SURFACE_COMMAND, THROTTLE_COMMAND)
+CONTROLLERS = tuple(controllers(adaptive=True))
+RECEIVED = tuple(topic.name for name, topic in BY_NAME.items() if listeners(name))
+COMMANDS = tuple(name for name in RECEIVED if name != STATE.name)
 # What somebody must report, any one of them, by the kind of the injection.
 EXPECTED = {
     "killed": {Fault.INPUT_MISSING, Fault.LATE, Fault.COMMAND_LOST},
@@ -83,18 +83,17 @@ class Injection(NamedTuple):
 
 def draw_injections(random: Random, count: int) -> Iterator[tuple[str, str, float]]:
     """Kind, target and length [s]; every kind comes up about equally often, none is left out."""
-    plans: list[tuple[str, tuple[str, ...]]] = [("killed", NODES), ("stopped", (*NODES, "plant"))]
-    received = tuple(topic.name for topic in RECEIVED)
-    commands = tuple(topic.name for topic in COMMANDS)
+    plans: list[tuple[str, tuple[str, ...]]] = [("killed", CONTROLLERS)]
+    plans.append(("stopped", (*CONTROLLERS, "plant")))
     for kind in EXPECTED:
         if kind == "wild":
             plans.append((kind, (RATE_COMMAND.name,)))
         elif kind == "out of range":
             plans.append((kind, (SURFACE_COMMAND.name, THROTTLE_COMMAND.name)))
         elif kind in ("ahead", "stale", "silent", "second publisher"):
-            plans.append((kind, commands))
+            plans.append((kind, COMMANDS))
         elif kind not in ("killed", "stopped"):
-            plans.append((kind, received))
+            plans.append((kind, RECEIVED))
     queue: list[tuple[str, tuple[str, ...]]] = []
     for _ in range(count):
         if not queue:
@@ -230,7 +229,7 @@ def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
             graph.start("plant")
             spectator.look(5.0)
             restarted = 1e9 < spectator.stamp != start and spectator.max_abs_alpha > 0.0
-            noticed = "all controllers: state lost" if lost >= {*NODES} and restarted else ""
+            noticed = "all controllers: state lost" if lost >= {*CONTROLLERS} and restarted else ""
             alpha = spectator.max_abs_alpha * DEGREES
             done.append(Injection("plant killed", "plant", start * 1e-9, 2.0, noticed, 1.5, alpha))
             graph.end_flight()

@@ -15,29 +15,19 @@ import yaml
 from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
 from ahv_control.parameters import (
-    INNER_LOOP_PARAMETERS,
-    LEARNER_PARAMETERS,
-    OUTER_INTERMEDIATE_PARAMETERS,
-    VELOCITY_PARAMETERS,
     inner_loop,
     intermediate_loop,
     learner_settings,
     outer_loop,
     velocity_loop,
 )
+from ahv_msgs_py.graph import NODES, case_nodes, controllers
 from ahv_msgs_py.parameters import SHARED, ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
-from ahv_plant.parameters import PLANT_PARAMETERS, PlantSettings, plant_settings
+from ahv_plant.parameters import PlantSettings, plant_settings
 
 EVERY_NODE = "/**"
-NODES = {
-    "plant": PLANT_PARAMETERS,
-    "outer_intermediate": OUTER_INTERMEDIATE_PARAMETERS,
-    "disturbance_learner": LEARNER_PARAMETERS,
-    "inner_loop": INNER_LOOP_PARAMETERS,
-    "velocity": VELOCITY_PARAMETERS,
-}
 
 
 class Draw(NamedTuple):
@@ -57,6 +47,11 @@ class Case(NamedTuple):
     plant: PlantSettings
     control: FlightControl
     draw: Draw | None = None  # of the dispersion among the parameters, if it was drawn
+
+    @property
+    def controllers(self) -> list[str]:
+        """Names of the controller nodes that fly it."""
+        return controllers(adaptive=self.control.learner is not None)
 
 
 def notes(case: Case) -> str:
@@ -127,8 +122,8 @@ def make_case(
 ) -> Case:
     """Case of the parameters `given` for each node; ParameterError names what is wrong."""
     parameters = {
-        node: check_parameters(f"{name}: {node}", known, given[node])
-        for node, known in NODES.items()
+        node: check_parameters(f"{name}: {node}", NODES[node].parameters, given[node])
+        for node in case_nodes()
     }
     adaptive = parameters["inner_loop"]["adaptive"]
     control = FlightControl(
@@ -149,7 +144,7 @@ def _read(path: Path) -> dict[str, dict[str, object]]:
         reason = " ".join(str(error).split())
         raise ParameterError(f"{path.name}: not a readable YAML file: {reason}") from error
     sections: dict[str, dict[str, object]] = {}
-    valid = [EVERY_NODE] + [f"{NAMESPACE}/{node}" for node in NODES]
+    valid = [EVERY_NODE] + [f"{NAMESPACE}/{node}" for node in case_nodes()]
     if not isinstance(content, dict):
         raise ParameterError(f"{path.name}: must have sections {', '.join(valid)}")
     for section, body in content.items():
@@ -173,9 +168,10 @@ def _read(path: Path) -> dict[str, dict[str, object]]:
                 f"{path.name}: {twice[0]} stands in {EVERY_NODE} and in {section}; once is enough"
             )
     return {
-        node: {name: shared[name] for name in shared if name in {p.name for p in known}}
+        node: {name: shared[name] for name in shared if name in known}
         | sections.get(f"{NAMESPACE}/{node}", {})
-        for node, known in NODES.items()
+        for node in case_nodes()
+        for known in [{parameter.name for parameter in NODES[node].parameters}]
     }
 
 

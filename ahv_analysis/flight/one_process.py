@@ -15,7 +15,7 @@ from ahv_analysis.bag.recorder_node import STOP, RecorderNode
 from ahv_analysis.errors import GraphError
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.library import fly
-from ahv_analysis.flight.process_per_node import controllers, node_class
+from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.process import DISCOVERY_RANGE
@@ -61,7 +61,8 @@ def fly_graph(
             recorder = RecorderNode(settings, context)
             nodes.append(recorder)
         nodes += [
-            node_class(name)(case.parameters[name] | mode, context) for name in controllers(case)
+            NODES[name].node_class(case.parameters[name] | mode, context)
+            for name in case.controllers
         ]
         listeners = len(nodes)
         plant = PlantNode(case.parameters["plant"] | mode | {"listeners": listeners}, context)

@@ -8,11 +8,9 @@ import signal
 import sys
 import time
 from collections.abc import Callable
-from importlib import import_module
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -21,6 +19,7 @@ from rclpy.experimental import EventsExecutor
 from ahv_analysis.errors import GraphError
 from ahv_analysis.faults.faulty_node import faulty
 from ahv_analysis.flight.case import Case, config_folder, notes
+from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.process import DISCOVERY_RANGE, run
@@ -30,32 +29,12 @@ from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
 from ahv_plant.model.constants import STEP_NS
 
-NODES = {
-    "recorder": "ahv_analysis.bag.recorder_node.RecorderNode",
-    "outer_intermediate": "ahv_control.outer_intermediate_node.OuterIntermediateNode",
-    "disturbance_learner": "ahv_control.disturbance_learner_node.DisturbanceLearnerNode",
-    "inner_loop": "ahv_control.inner_loop_node.InnerLoopNode",
-    "velocity": "ahv_control.velocity_node.VelocityNode",
-    "plant": "ahv_plant.plant_node.PlantNode",
-}
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 LONGEST_START = 30.0  # [s] until the first state
 LONGEST_SILENCE = 10.0  # [s] without a sign of the plant, after which the graph has failed
 LONGEST_END = 10.0  # [s] for a process to end by itself
 EXPECTED_ENDS = {"plant": (0, 1), "recorder": (0,)}  # exit codes when the flight is over
 LOOK = 0.05  # [s] between looks at the processes
-
-
-def controllers(case: Case) -> list[str]:
-    """Names of the controller nodes that a case needs."""
-    names = ["outer_intermediate", "disturbance_learner", "inner_loop", "velocity"]
-    return [name for name in names if name != "disturbance_learner" or case.control.learner]
-
-
-def node_class(name: str) -> type[Any]:
-    """Class of a node by its name in the graph."""
-    module, _, attribute = NODES[name].rpartition(".")
-    return getattr(import_module(module), attribute)  # type: ignore[no-any-return]
 
 
 def _run_node(
@@ -66,7 +45,9 @@ def _run_node(
     sys.argv = [name]
     if values[REALTIME.name]:
         take_precedence()  # at once: a node that is started again in flight is missed
-    kind = faulty(node_class(name)) if can_fail and name != "recorder" else node_class(name)
+    kind = NODES[name].node_class
+    if can_fail and NODES[name].sends:
+        kind = faulty(kind)
     code: object = 0
     try:
         run(lambda: kind(values))
@@ -112,22 +93,23 @@ class ProcessGraph:
         `spectators` listen to the state from outside; nodes that `can_fail` do so when told to.
         """
         self._can_fail = can_fail
-        listeners = len(controllers(case)) + (bag is not None) + spectators
+        self.controllers = case.controllers
+        listeners = len(self.controllers) + (bag is not None) + spectators
         mode: dict[str, Value] = {REALTIME.name: realtime}
-        self.values = {name: case.parameters[name] | mode for name in controllers(case)}
-        self.controllers = list(self.values)
+        # in the order of their start: who listens comes first
+        self.values: dict[str, dict[str, Value]] = {}
         if bag is not None:
-            self.values |= {"recorder": {"bag": str(bag), "notes": notes(case)} | mode}
+            self.values["recorder"] = {"bag": str(bag), "notes": notes(case)} | mode
+        self.values |= {name: case.parameters[name] | mode for name in self.controllers}
         self.values["plant"] = case.parameters["plant"] | mode | {"listeners": listeners}
         self.processes: dict[str, BaseProcess] = {}
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(
-            [path.rpartition(".")[0] for path in NODES.values()]
-            + ["ahv_analysis.flight.node_server"]
+            [node.module for node in NODES.values()] + ["ahv_analysis.flight.node_server"]
         )
 
     def __enter__(self) -> "ProcessGraph":
-        for name in sorted(self.values, key=list(NODES).index):
+        for name in self.values:
             self.start(name)
         return self
 

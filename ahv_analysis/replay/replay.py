@@ -28,9 +28,9 @@ from rclpy.task import Future
 
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import Case
-from ahv_analysis.flight.process_per_node import node_class
 from ahv_analysis.replay.inputs import LEARNER_NODE, Change, Recording
 from ahv_analysis.replay.result import Comparison, compare
+from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
@@ -40,31 +40,25 @@ from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import (
-    ATTITUDE_COMMAND,
+    BY_NAME,
     DIAGNOSTICS,
-    DISTURBANCE_ESTIMATE,
-    LEARNER,
     LEARNER_TOPICS,
     LOOP_TOPICS,
-    RATE_COMMAND,
     STATE,
-    SURFACE_COMMAND,
-    THROTTLE_COMMAND,
     LoopTopic,
 )
 from ahv_plant.model.constants import STEP_NS
 
-ANSWERS = {
-    "outer_intermediate": (ATTITUDE_COMMAND, RATE_COMMAND),
-    LEARNER_NODE: (LEARNER, DISTURBANCE_ESTIMATE),
-    "inner_loop": (SURFACE_COMMAND,),
-    "velocity": (THROTTLE_COMMAND,),
-}
 REPLAYED = "/replay"  # before the names of the topics of replayed nodes
 BATCH = 100  # steps that are fed before the answers are waited for
 LISTEN = 1.0  # [s] for other graphs, before anything is said where they could hear it
 LONGEST_SILENCE = 10.0  # [s] without an answer, after which the graph has failed
 LOOK = 0.2  # [s] between looks at the progress
+
+
+def answers(name: str) -> list[LoopTopic]:
+    """What a node answers a state with."""
+    return [BY_NAME[topic] for topic in NODES[name].sends]
 
 
 class Replay(NamedTuple):
@@ -110,7 +104,7 @@ def replay(
             graph.complete[name],
         )
         for name in names
-        for topic in ANSWERS[name]
+        for topic in answers(name)
     ]
     if not any(entry.compared for entry in comparisons):
         raise BagError(f"{recording.path} holds no command of {', '.join(names)} with its inputs")
@@ -123,7 +117,7 @@ def _remapping(recording: Recording, names: Sequence[str]) -> list[str]:
     """Remapping rules of ROS: where each replayed node publishes."""
     rules = []
     for name in names:
-        for topic in (*ANSWERS[name], DIAGNOSTICS):
+        for topic in (*answers(name), DIAGNOSTICS):
             if topic is DIAGNOSTICS or topic in recording.topics:
                 rules += ["-r", f"{name}:{topic.name}:={REPLAYED}{topic.name}"]
     return ["--ros-args", *rules]
@@ -159,7 +153,7 @@ class _Graph:
         self._recording = recording
         self.steps = sorted(set().union(*recording.topics.values()))
         self.answers: dict[LoopTopic, dict[int, Values]] = {
-            topic: {} for name in names for topic in ANSWERS[name]
+            topic: {} for name in names for topic in answers(name)
         }
         self.complete: dict[str, list[int]] = {}  # stamps of the steps that a node can answer
         self._received = 0
@@ -170,7 +164,7 @@ class _Graph:
         self._executor.add_node(self._feeder)
         self._nodes: dict[str, BaseNode] = {}
         for name in names:
-            self._nodes[name] = node_class(name)(case.parameters[name], context)
+            self._nodes[name] = NODES[name].node_class(case.parameters[name], context)
 
     def refuse_company(self) -> None:
         """Raise GraphError if somebody flies here: recorded commands must not reach a vehicle."""
@@ -211,7 +205,7 @@ class _Graph:
         """Stamps of the steps that a node has all inputs of; BagError if it can have none."""
         heard = {subscription.topic_name for subscription in node.subscriptions}
         inputs = [topic for topic in LOOP_TOPICS if topic.name in heard]
-        self._check(name, [*inputs, *ANSWERS[name]])
+        self._check(name, [*inputs, *answers(name)])
         states = self._stamps(STATE)
         common = set.intersection(*(self._stamps(topic) for topic in inputs))
         if name == LEARNER_NODE:  # learns from the step before; starts at any state
@@ -283,7 +277,7 @@ class _Graph:
 
     def _expected(self, end: int) -> int:
         return sum(
-            len(ANSWERS[name]) * bisect_left(stamps, end) for name, stamps in self.complete.items()
+            len(answers(name)) * bisect_left(stamps, end) for name, stamps in self.complete.items()
         )
 
     def _change(self, change: Change) -> None:

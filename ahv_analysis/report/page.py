@@ -15,10 +15,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib import pyplot
 
 from ahv_analysis.bag.record import Array
-from ahv_analysis.flight.case import NODES
 from ahv_analysis.report.page_figures import flight_figures
 from ahv_analysis.report.page_flight import Flight
 from ahv_analysis.report.signals import AXES, CONTROLS, GROUPS, TRACKED, Group, Signal
+from ahv_msgs_py.graph import NODES, case_nodes
 from ahv_msgs_py.parameters import Value
 
 PAGE = "template"  # folder of template, style, script and plotting library
@@ -179,9 +179,9 @@ def _groups(flights: Sequence[Flight]) -> Iterator[Group]:
 def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
     """Parameters of the nodes that flew; of disturbances those that were set."""
     cases = [flight.case for flight in flights if flight.case]
-    for node, parameters in NODES.items():
-        flying = [node != "disturbance_learner" or case.control.learner for case in cases]
-        for parameter in parameters if any(flying) else ():
+    for node in case_nodes():
+        flown = any(node in ("plant", *case.controllers) for case in cases)
+        for parameter in NODES[node].parameters if flown else ():
             values = [
                 None if flight.case is None else flight.case.parameters[node][parameter.name]
                 for flight in flights

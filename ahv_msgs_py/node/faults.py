@@ -92,7 +92,7 @@ class Fault(Enum):
         error=True,
     )
     INPUT_MISSING = Response(
-        "outer_intermediate, inner_loop, velocity, disturbance_learner, in real time",
+        "every controller, in real time",
         "an input of a step has not come when the next state does",
         "rate command: held for 200 ms, then zero rates; learner: last estimate, observer at the "
         "state; surfaces: what the plant holds; a state: the learner starts its observer anew at "
