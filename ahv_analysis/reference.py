@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from ahv_analysis.equation_index import equation_rows
 from ahv_msgs_py.graph import NODES, listeners, sender
 from ahv_msgs_py.node.faults import fault_rows
 from ahv_msgs_py.node.managed_node import SHELL_PARAMETERS
@@ -121,8 +122,14 @@ def faults() -> str:
     return table(("fault", "noticed by", "detection", "response", "latency"), fault_rows())
 
 
+def equations() -> str:
+    """Table from the report's equations to the code and its tests."""
+    return table(("equation", "built by", "tested by"), equation_rows(ROOT))
+
+
 PARTS: dict[str, Callable[[], str]] = {
-    part.__name__: part for part in (graph, loop_topics, viewer_topics, parameters, faults)
+    part.__name__: part
+    for part in (graph, loop_topics, viewer_topics, parameters, faults, equations)
 }
 
 
