@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ahv_msgs_py.parameters import ParameterError
 from ahv_plant.model.aerodynamics import Coefficients
 from ahv_plant.model.mass import Inertia
 from ahv_plant.numerics.elementary import sin_cos
@@ -61,13 +62,17 @@ class Truth(NamedTuple):
 
 
 NOMINAL = Truth()
+HIGHEST_LEVEL = 0.9  # [-] of a drawn dispersion
 
 
 def draw_dispersion(level: float, seed: int, run: int) -> Dispersion:
     """Multipliers 1 + U(-level, level) [-], one each, of the run `run` of the campaign `seed`.
 
-    Any run can be drawn again alone, with the same bits.
+    Any run can be drawn again alone, with the same bits. Raises ParameterError for a level at
+    which a vehicle would have next to nothing left of something.
     """
+    if not 0.0 <= level <= HIGHEST_LEVEL:
+        raise ParameterError(f"level is {level:g}, but must be 0 to {HIGHEST_LEVEL:g}")
     draws = np.random.default_rng((seed, run)).uniform(-level, level, len(Dispersion._fields))
     return Dispersion(*(1.0 + draws).tolist())
 

@@ -14,7 +14,6 @@ from typing import Annotated, Any
 import typer
 
 from ahv_analysis.command.console import (
-    HIGHEST_LEVEL,
     Json,
     UsageError,
     check_domain,
@@ -24,6 +23,7 @@ from ahv_analysis.command.console import (
     progress_bar,
     show_table,
 )
+from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
 
 monte_carlo = typer.Typer(

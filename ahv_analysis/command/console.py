@@ -28,7 +28,6 @@ from ahv_msgs_py.parameters import ParameterError
 
 console = Console()
 HIGHEST_DOMAIN = 232
-HIGHEST_LEVEL = 0.9  # [-] of a drawn dispersion
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 

@@ -14,7 +14,6 @@ import typer
 from ahv_analysis.command.bag import bag
 from ahv_analysis.command.campaign import monte_carlo, table
 from ahv_analysis.command.console import (
-    HIGHEST_LEVEL,
     Json,
     UsageError,
     check_domain,
@@ -29,6 +28,7 @@ from ahv_analysis.command.console import (
 from ahv_analysis.command.faults import faults
 from ahv_analysis.command.replay import replay
 from ahv_analysis.report.report import report
+from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import DEGREES, INITIAL_MASS, STEP
 from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED
 
