@@ -5,7 +5,8 @@ Frames: `base_link_frd` are body axes forward-right-down, `map_ned` is the flat 
 north-east-down (REP-103 suffixes). Every answer carries the stamp of the state that it answers.
 Quality of service in lockstep: reliable, transient local, the last 200 s of flight kept, so that
 a node that joins late gets what it missed, and a recorder that is slow gets everything. In real
-time: reliable, volatile, short queues, for old messages would not be obeyed.
+time: volatile, short queues, receivers that do not wait for what was lost, for old messages would
+not be obeyed; a recorder listens reliably.
 """
 
 from sys import float_info

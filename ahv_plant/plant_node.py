@@ -52,7 +52,7 @@ from ahv_plant.viewer_pose import (
     winged_cone,
 )
 
-LONGEST_WAIT = Duration(seconds=5.0)  # for a listener that has stopped, per topic
+LONGEST_WAIT = 2.0  # [s] for a listener that has stopped
 VIEWER_PERIOD = 10  # steps between messages for viewers: 10 Hz
 
 
@@ -241,11 +241,11 @@ class PlantNode(BaseNode):
         )
         self.finished.set_result(reason)
 
-    def destroy_node(self) -> None:
-        """Wait until every listener has got everything, then end."""
+    def conclude(self) -> None:
+        """Wait until every listener has got everything."""
+        until = time.monotonic() + LONGEST_WAIT
         for publisher in self.publishers:
-            publisher.wait_for_all_acked(LONGEST_WAIT)
-        super().destroy_node()
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, until - time.monotonic())))
 
     def _publish_for_viewers(self, stamp: int) -> None:
         """Send pose and velocity in both conventions; the body once, it moves with its frame."""

@@ -15,9 +15,9 @@ from ahv_analysis.flight.one_process import fly_graph
 from ahv_analysis.flight.process_per_node import (
     LONGEST_START,
     ProcessGraph,
-    Watcher,
-    set_transport,
 )
+from ahv_analysis.flight.watcher import Watcher
+from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.topics import STATE
 from test.witness import STILL, Stop, machine_watched, stood_still
 
@@ -66,7 +66,7 @@ class Misses:
 
 def bench_realtime(seconds: int) -> None:
     """State to both commands at 100 Hz, a process per node, recorder on."""
-    set_transport(realtime=True)
+    keep_to_this_machine()
     case = load_case(CASE, {"duration": float(seconds)})
     watcher = Watcher()
     misses = Misses(watcher)

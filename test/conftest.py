@@ -7,7 +7,10 @@ import os
 import pytest
 from hypothesis import settings
 
+from ahv_msgs_py.node.network import keep_to_this_machine
+
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+keep_to_this_machine()
 settings.register_profile("ahv", deadline=None, derandomize=True, print_blob=False)
 settings.load_profile("ahv")
 

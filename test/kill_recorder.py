@@ -26,7 +26,6 @@ from unittest.mock import patch
 from mcap.exceptions import McapError
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
-from rclpy.duration import Duration
 
 from ahv_analysis.bag.recovery import recover
 from ahv_analysis.flight import one_process
@@ -109,7 +108,7 @@ def kill_recorders(folder: Path, moments: Sequence[float], domain: int) -> list[
         with (
             suppress(_Enough),
             patch.object(one_process, "PlantNode", Plant),
-            patch.object(plant_node, "LONGEST_WAIT", Duration()),  # the dead acknowledge nothing
+            patch.object(plant_node, "LONGEST_WAIT", 0.0),  # the dead acknowledge nothing
         ):
             fly_graph(load_case("nominal_di"), None, domain=domain, progress=progress)
     finally:

@@ -30,9 +30,10 @@ from ahv_analysis.campaign.store import PART_RUNS, level_folder, part_files
 from ahv_analysis.campaign.summary import exact_interval, summarize_campaign
 from ahv_analysis.campaign.table import CONTROLLERS, REPORT, fly_table, markdown
 from ahv_analysis.errors import CampaignError
-from ahv_analysis.flight.case import config_folder, load_case
+from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.outcome import Cause
 from ahv_analysis.report.page_figures import campaign_figures
+from ahv_msgs_py.config import config_folder
 from test.test_command import ahv
 
 RUNS = 150

@@ -5,7 +5,8 @@ import math
 
 import pytest
 
-from ahv_analysis.flight.case import case_names, config_folder, load_case
+from ahv_analysis.flight.case import case_names, load_case
+from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.parameters import ParameterError
 from ahv_plant.dispersion import NOMINAL
 from ahv_plant.model.constants import RADIANS

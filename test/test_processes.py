@@ -5,7 +5,9 @@ import os
 import signal
 import time
 from contextlib import contextmanager
+from ipaddress import ip_address
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 import pytest
@@ -24,13 +26,11 @@ from ahv_analysis.faults.faulty_node import wrong_messages
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
 from ahv_analysis.flight.process_per_node import (
-    PROFILES,
     ProcessGraph,
     fly_processes,
-    set_transport,
 )
 from ahv_msgs_py.node.faults import PERIOD
-from ahv_msgs_py.node.process import DISCOVERY_RANGE
+from ahv_msgs_py.node.network import DISCOVERY_RANGE, PROFILES, keep_to_this_machine
 from ahv_msgs_py.node.real_time import PRIORITY
 from ahv_msgs_py.topics import SURFACE_COMMAND
 from ahv_plant.model.constants import DEGREES, STEP_NS
@@ -46,8 +46,7 @@ def private(monkeypatch, domain):
     """Every test in a domain of its own, with the transport that it sets."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     monkeypatch.setenv(DISCOVERY_RANGE, "LOCALHOST")  # and as it was, afterwards
-    yield
-    os.environ.pop(PROFILES, None)
+    monkeypatch.delenv(PROFILES)
 
 
 def shared_memory(domain):
@@ -84,7 +83,7 @@ def test_a_controller_that_dies_in_lockstep_ends_the_flight(tmp_path):
 @contextmanager
 def watched(name, until, realtime=True):
     """A flight that has got to a step and goes on for ever: its processes and a spectator."""
-    set_transport(realtime)
+    keep_to_this_machine(shared_memory=not realtime)
     spectator = Spectator()
     try:
         case = load_case(name, {"duration": 3600.0})
@@ -142,6 +141,27 @@ def test_every_controller_can_be_killed_and_started_again(tmp_path):
             assert away(spectator, calm) < 1.0, name
             assert spectator.max_abs_alpha * DEGREES < 5.0, name
             assert graph.ended() == {}, name
+
+
+def listening(pid):
+    """Addresses that a process can be sent something at."""
+    sockets = {link.readlink().name for link in Path(f"/proc/{pid}/fd").iterdir()}
+    for table in ("udp", "udp6", "tcp", "tcp6"):
+        for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if f"socket:[{fields[9]}]" in sockets:
+                words = wrap(fields[1].partition(":")[0], 8)  # each with its last byte first
+                yield ip_address(b"".join(bytes.fromhex(word)[::-1] for word in words))
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_nobody_on_another_machine_is_heard(realtime):
+    """A socket that is bound to a group of multicast gets what is sent to the group alone."""
+    with watched("nominal_di", 1, realtime) as (graph, _):
+        for name, process in graph.processes.items():
+            addresses = set(listening(process.pid))
+            assert addresses, name
+            assert all(one.is_loopback or one.is_multicast for one in addresses), name
 
 
 def may_take_precedence():

@@ -12,8 +12,9 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from ahv_analysis.bag.reader import read_bag
-from ahv_analysis.flight.case import config_folder, load_case
+from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.one_process import fly_graph
+from ahv_msgs_py.config import config_folder
 from ahv_plant.model.constants import DEGREES
 
 PLOTJUGGLER = config_folder() / "viewers" / "plotjuggler.xml"

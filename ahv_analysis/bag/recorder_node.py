@@ -171,8 +171,8 @@ class RecorderNode(BaseNode):
         """How many messages the bag lacks of a flight of so many steps; negative: others flew."""
         return sum(steps + 1 - self._bag.counts[topic.name] for topic in topics)
 
-    def destroy_node(self) -> None:
-        """Close the bag, then the node."""
+    def conclude(self) -> None:
+        """Close the bag."""
         if self._bag is not None:
             self._take()
             try:
@@ -180,7 +180,7 @@ class RecorderNode(BaseNode):
             except BagError as error:
                 if self.failure is None:
                     self._fail(error)
-        super().destroy_node()
+        self._bag = None
 
 
 def _waiting(subscription: Subscription) -> list[bytes]:

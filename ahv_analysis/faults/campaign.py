@@ -20,12 +20,12 @@ from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.process_per_node import (
     LONGEST_START,
     ProcessGraph,
-    Watcher,
-    set_transport,
 )
+from ahv_analysis.flight.watcher import Watcher
 from ahv_msgs_py.graph import controllers, listeners
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
+from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import (
     BY_NAME,
@@ -181,7 +181,7 @@ def _disturbed_flight(
     progress: Callable[[], None],
 ) -> dict[str, Any]:
     """One flight with the injections of a plan."""
-    set_transport(realtime=True)
+    keep_to_this_machine()
     spectator = Spectator()
     unexpected: list[str] = []
     try:
@@ -201,7 +201,7 @@ def _disturbed_flight(
 
 def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
     """One flight that loses its recorder, and then its plant, and gets a new one."""
-    set_transport(realtime=True)
+    keep_to_this_machine()
     spectator = Spectator()
     try:
         case = load_case(CASE, {"duration": 3600.0})

@@ -5,7 +5,6 @@ The same file sets up a flight here and a node by `--ros-args --params-file`.
 """
 
 import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -21,6 +20,7 @@ from ahv_control.parameters import (
     outer_loop,
     velocity_loop,
 )
+from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES, case_nodes, controllers
 from ahv_msgs_py.parameters import SHARED, ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
@@ -60,18 +60,6 @@ def notes(case: Case) -> str:
     if case.draw is not None:
         content["draw"] = case.draw._asdict()
     return json.dumps(content)
-
-
-def config_folder() -> Path:
-    """Folder `config` of the source tree, or of the installation."""
-    source = Path(__file__).resolve().parents[2]
-    if (source / "package.xml").exists():
-        return source / "config"
-    # setuptools installs into <prefix>/lib/pythonX.Y/site-packages, and data into <prefix>/share
-    for prefix in (*source.parents, Path(sys.prefix)):
-        if (prefix / "share" / "ahv" / "config").is_dir():
-            return prefix / "share" / "ahv" / "config"
-    raise FileNotFoundError("the configuration of ahv is not installed beside its code")
 
 
 def case_names() -> list[str]:

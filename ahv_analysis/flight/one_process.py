@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """A flight on the ROS graph, all nodes in this process, in lockstep."""
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -18,7 +17,7 @@ from ahv_analysis.flight.library import fly
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.managed_node import REALTIME
-from ahv_msgs_py.node.process import DISCOVERY_RANGE
+from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
@@ -48,7 +47,7 @@ def fly_graph(
     GraphError if the graph stops and BagError if the disk fails; with `on_error` CONTINUE the
     flight goes on without a record then.
     """
-    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
+    keep_to_this_machine()
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=domain)
     executor = EventsExecutor(context=context)

@@ -8,37 +8,69 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.experimental import EventsExecutor
+from rclpy.clock import Clock, ClockType
 
 from ahv_analysis.errors import GraphError
 from ahv_analysis.faults.faulty_node import faulty
-from ahv_analysis.flight.case import Case, config_folder, notes
+from ahv_analysis.flight.case import Case, notes
 from ahv_msgs_py.graph import NODES
-from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.managed_node import REALTIME
-from ahv_msgs_py.node.process import DISCOVERY_RANGE, run
-from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.network import keep_to_this_machine
+from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
-from ahv_plant.model.constants import STEP_NS
+from ahv_plant.plant_node import PlantNode
 
-PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 LONGEST_START = 30.0  # [s] until the first state
 LONGEST_SILENCE = 10.0  # [s] without a sign of the plant, after which the graph has failed
 LONGEST_END = 10.0  # [s] for a process to end by itself
-EXPECTED_ENDS = {"plant": (0, 1), "recorder": (0,)}  # exit codes when the flight is over
-LOOK = 0.05  # [s] between looks at the processes
+LOOK = 0.05  # [s] between looks at the processes, and of the plant at its progress
+
+
+class FlightReport:
+    """What the process of the plant tells the one that started the graph, past the middleware.
+
+    So that one takes part in no ROS graph: no one else's word ends a flight, and nothing of the
+    middleware can hold up the end of a command.
+    """
+
+    def __init__(self, context: ForkServerContext):
+        """Make what both processes share."""
+        self._step = context.RawValue("q", -1)
+        self._told, self._tell = context.Pipe(duplex=False)
+
+    def report(self, plant: PlantNode) -> None:
+        """In the plant's process: tell of the step now and then, and of the end."""
+
+        def progress() -> None:
+            self._step.value = plant.step
+
+        plant.create_timer(LOOK, progress, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        plant.finished.add_done_callback(lambda end: self._tell.send(end.result()))
+
+    @property
+    def step(self) -> int:
+        """The newest step that is known of; -1 if there was none."""
+        return int(self._step.value)
+
+    def ended(self, seconds: float) -> str | None:
+        """Wait so long for the end: why it came early, empty if it did not; None if none came."""
+        return self._told.recv() if self._told.poll(seconds) else None
 
 
 def _run_node(
-    name: str, values: dict[str, Value], can_fail: bool, environment: dict[str, str]
+    name: str,
+    values: dict[str, Value],
+    can_fail: bool,
+    environment: dict[str, str],
+    report: FlightReport,
 ) -> None:
     """Be the process of a node; the server has the environment of when it was started."""
     os.environ.update(environment)
@@ -48,9 +80,16 @@ def _run_node(
     kind = NODES[name].node_class
     if can_fail and NODES[name].sends:
         kind = faulty(kind)
+
+    def make() -> BaseNode:
+        node = kind(values)
+        if isinstance(node, PlantNode):
+            report.report(node)
+        return node
+
     code: object = 0
     try:
-        run(lambda: kind(values))
+        run(make)
     except SystemExit as end:
         code = end.code
     # A forked process ends without finalizing Python, and what holds DDS would stay in /dev/shm.
@@ -58,19 +97,6 @@ def _run_node(
     gc.collect()
     rclpy.get_default_context().destroy()
     sys.exit(code)
-
-
-def set_transport(realtime: bool) -> None:
-    """Choose how the processes to be started find and hear each other, unless it is chosen.
-
-    They keep to this machine. In real time by a profile of Fast DDS, UDP on the loopback, since
-    through shared memory a node that was killed and started again is not heard for seconds; ROS's
-    own word for this machine alone must not be said then, for it adds shared memory.
-    """
-    here = os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST") == "LOCALHOST"
-    if realtime and here and PROFILES not in os.environ:
-        os.environ[DISCOVERY_RANGE] = "SYSTEM_DEFAULT"  # of the profile
-        os.environ[PROFILES] = str(config_folder() / "fastdds" / "realtime.xml")
 
 
 class ProcessGraph:
@@ -104,6 +130,7 @@ class ProcessGraph:
         self.values["plant"] = case.parameters["plant"] | mode | {"listeners": listeners}
         self.processes: dict[str, BaseProcess] = {}
         self._context = multiprocessing.get_context("forkserver")
+        self.report = FlightReport(self._context)
         self._context.set_forkserver_preload(
             [node.module for node in NODES.values()] + ["ahv_analysis.flight.node_server"]
         )
@@ -122,7 +149,7 @@ class ProcessGraph:
         }
         process = self._context.Process(
             target=_run_node,
-            args=(name, self.values[name], self._can_fail, environment),
+            args=(name, self.values[name], self._can_fail, environment, self.report),
             name=name,
             daemon=True,
         )
@@ -173,50 +200,6 @@ class ProcessGraph:
                 process.join()
 
 
-class Watcher:
-    """Listens to the diagnostics of the graph from outside it."""
-
-    def __init__(self) -> None:
-        """Start to listen; no flight has been seen yet."""
-        self.context = rclpy.Context()
-        rclpy.init(context=self.context)
-        self._node = rclpy.create_node("watcher", namespace=NAMESPACE, context=self.context)
-        self._executor = EventsExecutor(context=self.context)
-        self._executor.add_node(self._node)
-        self._node.create_subscription(
-            DiagnosticArray, DIAGNOSTICS.name, self._take, quality(durable=True)
-        )
-        self.step = -1  # of the newest report of the plant
-        self.over: dict[str, str] | None = None  # what the plant said at the end
-        self.reason = ""  # why it ended early
-        self.statuses: list[tuple[int, str, int, str, dict[str, str]]] = []
-
-    def _take(self, message: DiagnosticArray) -> None:
-        stamp = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
-        for status in message.status:
-            facts = {fact.key: fact.value for fact in status.values}
-            name = status.name.rpartition("/")[2]
-            self.statuses.append((stamp, name, status.level[0], status.message, facts))
-            if name == "plant":
-                self.step = stamp // STEP_NS
-                if "over" in facts:
-                    self.over = facts
-                    self.reason = "" if status.level == b"\x00" else status.message
-
-    def look(self, seconds: float) -> None:
-        """Listen for so long."""
-        until = time.monotonic() + seconds
-        while (left := until - time.monotonic()) > 0:
-            self._executor.spin_once(left)
-
-    def close(self) -> None:
-        """Stop listening."""
-        self._executor.remove_node(self._node)
-        self._executor.shutdown()
-        self._node.destroy_node()
-        rclpy.shutdown(context=self.context)
-
-
 def fly_processes(
     case: Case,
     bag: Path | None,
@@ -229,33 +212,30 @@ def fly_processes(
     In real time a controller that ends is started again at once. Returns why the flight ended
     early (empty if it did not) and the seconds that it took. Raises GraphError if the graph stops.
     """
-    set_transport(realtime)
-    watcher = Watcher()
-    try:
-        with ProcessGraph(case, bag, realtime) as graph:
-            wall = _watch(watcher, graph, realtime, progress)
-    finally:
-        watcher.close()
-    return watcher.reason, wall
+    keep_to_this_machine(shared_memory=not realtime)
+    with ProcessGraph(case, bag, realtime) as graph:
+        return _watch(graph, realtime, progress)
 
 
 def _watch(
-    watcher: Watcher, graph: ProcessGraph, realtime: bool, progress: Callable[[int], None]
-) -> float:
-    """Look on until the plant says that the flight is over; returns the seconds that it took."""
+    graph: ProcessGraph, realtime: bool, progress: Callable[[int], None]
+) -> tuple[str, float]:
+    """Look on until the plant says that the flight is over: why, and the seconds that it took."""
     last, since, started = -1, time.monotonic() + LONGEST_START, 0.0
-    while watcher.over is None:
-        watcher.look(LOOK)
-        progress(watcher.step)
-        now = time.monotonic()
-        if watcher.step != last:
+    while True:
+        ended = graph.ended()  # first: who has ended may have said something before
+        reason = graph.report.ended(LOOK)
+        step, now = graph.report.step, time.monotonic()
+        progress(step)
+        if reason is not None:
+            return reason, now - started
+        if step != last:
             started = started or now
-            last, since = watcher.step, now
+            last, since = step, now
         elif now - since > LONGEST_SILENCE:
-            raise GraphError(f"the graph stopped at step {watcher.step}")
-        for name, code in graph.ended().items():
+            raise GraphError(f"the graph stopped at step {step}")
+        for name, code in ended.items():
             if realtime and name in graph.controllers and code != 2:
                 graph.start(name)
-            elif code not in EXPECTED_ENDS.get(name, ()) and watcher.over is None:
+            elif (name, code) != ("recorder", 0):  # it may hear of the end before this one does
                 raise GraphError(f"{name} ended in flight with exit code {code}")
-    return time.monotonic() - started

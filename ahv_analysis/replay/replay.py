@@ -35,7 +35,7 @@ from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
-from ahv_msgs_py.node.process import DISCOVERY_RANGE
+from ahv_msgs_py.node.network import DISCOVERY_RANGE, keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import ParameterError
@@ -128,16 +128,15 @@ def _context(
     arguments: Sequence[str], domain: int | None, hidden: bool
 ) -> Iterator[rclpy.Context]:
     """Context of its own; a hidden one is not discovered by anybody, and discovers nobody."""
-    before = os.environ.get(DISCOVERY_RANGE)
-    os.environ[DISCOVERY_RANGE] = "OFF" if hidden else before or "LOCALHOST"
+    keep_to_this_machine()
+    before = os.environ[DISCOVERY_RANGE]
+    if hidden:
+        os.environ[DISCOVERY_RANGE] = "OFF"
     context = rclpy.Context()
     try:
         rclpy.init(args=list(arguments), context=context, domain_id=domain)
     finally:
-        if before is None:
-            del os.environ[DISCOVERY_RANGE]
-        else:
-            os.environ[DISCOVERY_RANGE] = before
+        os.environ[DISCOVERY_RANGE] = before
     try:
         yield context
     finally:

@@ -20,7 +20,7 @@ from ahv_msgs_py.node.guard import Guard, Refusal
 from ahv_msgs_py.node.health import ERROR, OK, WARN, Health
 from ahv_msgs_py.node.managed_node import ManagedNode
 from ahv_msgs_py.node.messages import diagnostics, general_reader, message_class
-from ahv_msgs_py.node.quality import REALTIME_DEPTH, SENDER_DEPTH, quality
+from ahv_msgs_py.node.quality import SENDER_DEPTH, newest, quality
 from ahv_msgs_py.node.real_time import reserve_memory
 from ahv_msgs_py.node.synchronizer import Fallback, RealTimeSteps, Stepwise, Values
 from ahv_msgs_py.parameters import Parameter, Value
@@ -73,8 +73,8 @@ class BaseNode(ManagedNode):
     # Topics
 
     def loop_quality(self) -> QoSProfile:
-        """Quality of service of a receiver: lockstep keeps a whole flight, real time little."""
-        return quality(durable=False, depth=REALTIME_DEPTH) if self.realtime else quality(True)
+        """Quality of a receiver: a whole flight in lockstep, the newest in real time."""
+        return newest() if self.realtime else quality(True)
 
     def publisher(
         self,

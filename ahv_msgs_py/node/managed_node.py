@@ -130,6 +130,14 @@ class ManagedNode(LifecycleNode):
         while self._opened:
             self._opened.pop()()
 
+    def conclude(self) -> None:
+        """Do what has to be done before the node goes."""
+
+    def destroy_node(self) -> None:
+        """Conclude, then go."""
+        self.conclude()
+        super().destroy_node()
+
     def _transition(self, work: Callable[[], None]) -> TransitionCallbackReturn:
         """Do the work of a transition; rclpy would swallow what it raises."""
         try:

@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """A node as a process: start, spin, end."""
 
-import os
 import signal
 import sys
 import threading
@@ -12,12 +11,14 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.deadline import end_within
 from ahv_msgs_py.node.managed_node import AUTOSTART
+from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import ParameterError
 
 LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
-DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # this machine alone, unless it is set
+LONGEST_TEARDOWN = 2.0  # [s] of a node that has done what it had to
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -26,7 +27,7 @@ def run(node_class: Callable[[], BaseNode]) -> None:
 
     It configures and activates itself; with `autostart` false the lifecycle services do that.
     """
-    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
+    keep_to_this_machine()
     stop = threading.Event()
     for number in SIGNALS:  # never in the middle of a message, and a second one changes nothing
         signal.signal(number, lambda *_: stop.set())
@@ -35,7 +36,7 @@ def run(node_class: Callable[[], BaseNode]) -> None:
     except RuntimeError as error:  # arguments that ROS itself refuses
         print(" ".join(str(error).split()), file=sys.stderr)
         sys.exit(2)
-    code = 0
+    code = 1  # if something happens that nobody thought of
     node = None
     executor = EventsExecutor()
     try:
@@ -54,6 +55,8 @@ def run(node_class: Callable[[], BaseNode]) -> None:
     finally:
         if node is not None:
             executor.remove_node(node)
+            node.conclude()
+        end_within(LONGEST_TEARDOWN, code)
         executor.shutdown()
         if node is not None:
             node.destroy_node()

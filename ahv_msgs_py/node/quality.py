@@ -18,3 +18,17 @@ def quality(durable: bool, depth: int = QUEUE_DEPTH) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE,
         durability=local,
     )
+
+
+def newest() -> QoSProfile:
+    """Quality of service of a receiver in real time: what was lost is not waited for.
+
+    A reliable receiver that was held up, and has lost messages by that, gets none of the newer
+    ones before it has been sent the lost ones again, which are too old to be obeyed by then.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=REALTIME_DEPTH,
+        reliability=ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.VOLATILE,
+    )
