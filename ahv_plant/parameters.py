@@ -91,7 +91,13 @@ def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
     except ValueError as error:
         raise ParameterError(f"plant: initial {error}") from error
     truth = Truth(geometric, _dispersion(values), _disturbance(values))
-    return PlantSettings(initial, round(float(values["duration"]) / STEP), truth)
+    duration = float(values["duration"])
+    steps = round(duration / STEP)
+    if abs(steps * STEP - duration) > 1e-9:
+        raise ParameterError(
+            f"plant: duration is {duration!r} s, but must be whole steps of {STEP:g} s"
+        )
+    return PlantSettings(initial, steps, truth)
 
 
 def _dispersion(values: Mapping[str, Value]) -> Dispersion:

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from ahv_analysis.bag.writer import BagWriter
-from ahv_analysis.command.main import app
+from ahv_analysis.command.app import app
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly_library
 from test.bags import DAMAGES, cut_in_flight, one_bit_flipped, without_a_topic, without_metadata
@@ -74,9 +74,12 @@ def test_damage_is_named_and_nothing_is_changed(tmp_path, whole, damage, command
     before = tree(tmp_path)
     result = ahv(*({"BAG": bag, "OUT": out}.get(word, word) for word in command))
     assert result.exit_code == 2
-    assert result.stdout == ""
-    assert result.stderr.startswith("ahv: ") and str(bag) in result.stderr
-    assert result.stderr.count("\n") == 1
+    if "--json" in command:
+        assert str(bag) in json.loads(result.stdout)["error"] and result.stderr == ""
+    else:
+        assert result.stdout == ""
+        assert result.stderr.startswith("ahv: ") and str(bag) in result.stderr
+        assert result.stderr.count("\n") == 1
     assert tree(tmp_path) == before
 
 

@@ -300,6 +300,12 @@ def test_a_damaged_campaign_is_named(tmp_path, kind):
         open_campaign(tmp_path)
 
 
+def test_two_levels_never_share_a_folder(tmp_path):
+    names = {level_folder(tmp_path, level).name for level in (0.1234567, 0.12345671, 0.123457)}
+    assert names == {"runs-0.1234567", "runs-0.12345671", "runs-0.123457"}
+    assert level_folder(tmp_path, 0.0).name == "runs-0"  # as ever
+
+
 def test_a_level_without_runs_is_named(tmp_path):
     (tmp_path / "runs-0.3").mkdir()
     with pytest.raises(CampaignError, match=r"runs-0\.3 holds no runs of a campaign"):

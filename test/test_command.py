@@ -10,17 +10,18 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from ahv_analysis.flight.case import case_names
 from ahv_plant.model.vectors import State
 
 
-def ahv(*arguments, domain=100, cwd=None):
+def ahv(*arguments, domain=100, cwd=None, **environment):
     """Run the command as a process of its own."""
     return subprocess.run(
         [Path(sys.executable).parent / "ahv", *map(str, arguments)],
         capture_output=True,
         text=True,
         cwd=cwd,
-        env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain)} | environment,
         timeout=120,
     )
 
@@ -44,6 +45,120 @@ def test_trim_as_a_table():
     result = ahv("trim")
     assert result.returncode == 0
     assert "91.878" in result.stdout and "theta_deg" in result.stdout
+
+
+def test_a_trim_is_rounded_to_what_is_meant():
+    found = json.loads(ahv("trim", "--json").stdout)
+    assert (found["v_mps"], found["rudder_deg"]) == (0.0, 0.0)
+
+
+def test_a_trim_out_of_limits_is_told_by_words_and_exit_code():
+    result = ahv("trim", "--altitude", 9000, "--speed", 2500)
+    assert result.returncode == 1
+    assert result.stderr == "ahv: the trim is out of reach: throttle 1.5643 (0.1 to 0.9)\n"
+
+
+def test_what_a_newcomer_types_first():
+    version = ahv("--version")
+    assert (version.returncode, version.stderr) == (0, "")
+    assert version.stdout.startswith("ahv 0.")
+    bare = ahv()
+    assert (bare.returncode, bare.stderr) == (0, "")
+    assert bare.stdout == ahv("-h").stdout == ahv("--help").stdout
+    assert "..." not in bare.stdout.replace("[ARGS]...", "")  # no text is cut
+    names = [line.split()[0] for line in bare.stdout.partition("Commands:\n")[2].splitlines()]
+    in_order = "fly figures report bag replay monte-carlo table faults trim"
+    assert " ".join(names) == in_order
+    flying = ahv("fly", "--help").stdout
+    assert all(name in flying.replace(",", " ").split() for name in case_names())
+
+
+@pytest.mark.parametrize("group", ["bag", "monte-carlo", "faults"])
+def test_help_texts_are_whole(group):
+    commands = ahv(group, "--help").stdout.partition("Commands:\n")[2]
+    assert commands and "..." not in commands
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (("trim", "--mass", "nan"), "mass nan kg"),
+        (("trim", "--nope"), "--nope"),
+        (("--nope",), "--nope"),
+        (("fly", "nominal_di", "--duration", 1.005), "whole steps of 0.01 s"),
+    ],
+)
+def test_with_json_errors_are_json(arguments, words, tmp_path):
+    result = ahv(*arguments, "--json", cwd=tmp_path)
+    assert (result.returncode, result.stderr) == (2, "")
+    assert words in json.loads(result.stdout)["error"]
+
+
+@pytest.mark.parametrize("arguments", [("trim", "--json"), ("trim",), ("--help",)])
+def test_output_that_nobody_reads_ends_in_silence(arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [Path(sys.executable).parent / "ahv", *arguments]
+    result = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=60)
+    os.close(writer)
+    assert (result.returncode, result.stderr) == (141, b"")
+
+
+def test_a_full_disk_is_named():
+    with open("/dev/full", "w") as full:
+        command = [Path(sys.executable).parent / "ahv", "trim", "--json"]
+        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, timeout=60)
+    assert result.returncode == 2
+    assert result.stderr.startswith(b"ahv: ") and result.stderr.count(b"\n") == 1
+
+
+def test_a_terminal_without_width_shows_all():
+    assert ahv("trim", COLUMNS="0").stdout == ahv("trim").stdout
+
+
+ODD = "x[/red] [bold]Grün :smile: \udcff"  # markup, an emoji code, and a byte that is no text
+
+
+def test_a_name_is_never_markup_and_no_output_fails_for_its_characters(tmp_path):
+    """All commands about a flight, in a folder and on a terminal as odd as can be."""
+    odd = {"PYTHONIOENCODING": "ascii", "MPLBACKEND": "nonsense", "domain": "101"}
+    out = tmp_path / ODD
+    shown = "x[/red] [bold]Gr\\xfcn :smile: \\udcff"
+
+    def told(*arguments):
+        result = ahv(*arguments, cwd=tmp_path, **odd)
+        assert result.returncode == 0, result.stderr
+        assert "Traceback" not in result.stderr
+        return "".join(result.stdout.replace("|", "").split())
+
+    flight = ("fly", "neuro_adaptive_di", "--engine", "library", "--duration", 0.2)
+    bag = Path(ODD) / "bag"
+    said = "".join(shown.split())
+    assert said in told(*flight, "--out", ODD)
+    assert said in told("bag", "info", bag)
+    assert said in told("bag", "recover", bag)
+    assert said in told("bag", "export", bag, "--csv", out / "flight.csv")
+    assert said in told("figures", bag, "--out", out / "figures")
+    assert said in told("report", bag, "--out", out / "pages")
+    assert said in told("replay", bag, "--out", out / "replayed")
+
+
+def test_a_campaign_in_an_odd_folder(tmp_path):
+    folder = "x[/red] Grün :smile:"
+    campaign = ("monte-carlo", "--controller", "nominal_di", "--runs", 2, "--out", folder)
+    flown = ahv(*campaign, cwd=tmp_path, PYTHONIOENCODING="ascii")
+    assert flown.returncode == 0, flown.stderr
+    assert "x[/red] Gr\\xfcn :smile:" in flown.stdout
+    assert ahv("faults", PYTHONIOENCODING="ascii").returncode == 0
+
+
+def test_figures_are_never_overwritten(flown, tmp_path):
+    _, out, _ = flown
+    (tmp_path / "figure_3_2.svg").write_text("mine")
+    result = ahv("figures", out / "bag", "--out", tmp_path)
+    assert result.returncode == 2
+    assert "figure_3_2.svg exists already: choose another --out" in result.stderr
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["mine"]
 
 
 @pytest.fixture(scope="module", params=["graph", "library"])
@@ -143,7 +258,7 @@ def test_a_flight_that_ends_early_says_so_by_its_exit_code(tmp_path):
 
 
 def test_a_domain_that_ros_refuses_is_named(tmp_path):
-    result = ahv("fly", "nominal_di", "--json", domain="abc", cwd=tmp_path)
+    result = ahv("fly", "nominal_di", domain="abc", cwd=tmp_path)
     assert result.returncode == 2
     assert result.stdout == "" and "ROS_DOMAIN_ID is 'abc'" in result.stderr
 
@@ -152,7 +267,7 @@ def test_the_library_engine_needs_no_ros(tmp_path):
     """The whole way of a flight and its figures without rclpy to import."""
     program = (
         "import sys; sys.modules['rclpy'] = None\n"
-        "from ahv_analysis.command.main import app\n"
+        "from ahv_analysis.command.app import app\n"
         f"out = {str(tmp_path)!r}\n"
         "fly = ['fly', 'neuro_adaptive_di', '--engine', 'library', '--duration', '0.5']\n"
         "app([*fly, '--out', out], standalone_mode=False)\n"

@@ -15,7 +15,7 @@ import pytest
 import typer
 import yaml
 
-from ahv_analysis.command.main import app
+from ahv_analysis.command.app import app
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 from test.documents import (

@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
 from ahv_analysis.bag.writer import BagWriter
-from ahv_analysis.command.main import app
+from ahv_analysis.command.app import app
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import case_names, load_case, notes
 from ahv_analysis.flight.library import fly_library

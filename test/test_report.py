@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from ahv_analysis.bag.reader import read_bag
 from ahv_analysis.bag.record import record
 from ahv_analysis.bag.writer import BagWriter
-from ahv_analysis.command.main import app
+from ahv_analysis.command.app import app
 from ahv_analysis.flight.case import Draw, load_case
 from ahv_analysis.flight.library import fly, fly_library, write_step
 from ahv_analysis.flight.summary import summarize

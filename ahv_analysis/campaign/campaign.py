@@ -16,6 +16,7 @@ from ahv_analysis.campaign.store import (
     PART_RUNS,
     Columns,
     level_folder,
+    level_name,
     part_file,
     part_files,
     read_part,
@@ -221,7 +222,7 @@ def _jobs(
 def open_campaign(folder: Path, level: float | None = None) -> Campaign:
     """Campaign that a folder holds, of `level` if it holds several."""
     found = {path.name.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*"))}
-    chosen = [name for name in found if level is None or name == f"{level:g}"]
+    chosen = [name for name in found if level is None or name == level_name(level)]
     if len(chosen) != 1:
         raise CampaignError(
             f"{folder} holds {len(chosen)} campaigns to choose from by --level; "

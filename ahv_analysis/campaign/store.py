@@ -24,9 +24,14 @@ DESCRIBED = {"source", "case", "level", "seed", "random_starts", "parameters"}
 Columns = dict[str, Array]
 
 
+def level_name(level: float) -> str:
+    """Name of a level: two levels never share one."""
+    return np.format_float_positional(level, trim="-")
+
+
 def level_folder(folder: Path, level: float) -> Path:
     """Folder of one level of a campaign."""
-    return folder / f"runs-{level:g}"
+    return folder / f"runs-{level_name(level)}"
 
 
 def part_file(runs: Path, first: int) -> Path:

@@ -9,8 +9,6 @@ import typer
 from ahv_analysis.command.console import (
     Json,
     UsageError,
-    console,
-    one_sentence,
     print_json,
     show_table,
 )
@@ -26,9 +24,11 @@ UNDISPERSED = 1.0
 
 
 @bag.command()
-@one_sentence
 def info(path: Folder, as_json: Json = False) -> None:
-    """Say what a bag holds: what flew, for how long, and whether all of it is there."""
+    """Say what a bag holds.
+
+    What flew, for how long, and whether all of it is there.
+    """
     from ahv_analysis.bag.info import bag_info
 
     facts = bag_info(path)
@@ -69,18 +69,19 @@ def _completeness(facts: dict[str, Any]) -> str:
 
 
 @bag.command()
-@one_sentence
 def recover(
     path: Folder,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for the recovered bag, which must not exist  [BAG-recovered]"),
+        typer.Option(
+            help="Folder for the recovered bag, which must not exist, by default BAG-recovered."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write what is readable of a damaged bag to a new one, and say what was lost.
+    """Write what is readable of a damaged bag to a new one.
 
-    The damaged bag stays as it is.
+    What was lost is said. The damaged bag stays as it is.
     """
     from ahv_analysis.bag.recovery import recover as write_recovered
 
@@ -93,7 +94,7 @@ def recover(
     if as_json:
         print_json(facts)
     elif recovery is None:
-        console.print(f"{path} is whole: nothing to recover")
+        print(f"{path} is whole: nothing to recover")
     else:
         lost = recovery.lost_messages
         rows = [
@@ -128,7 +129,6 @@ def _span(facts: dict[str, Any]) -> str:
 
 
 @bag.command()
-@one_sentence
 def export(
     path: Folder,
     csv: Annotated[Path | None, typer.Option(help="CSV file to write.")] = None,
@@ -136,9 +136,10 @@ def export(
     netcdf: Annotated[Path | None, typer.Option(help="netCDF file to write.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Write the flight of a bag as a table: time, states, commands, learner, air data.
+    """Write the flight of a bag as a table.
 
-    A file that exists is never overwritten.
+    Its columns are time, states, commands, learner and air data. A file that exists is never
+    overwritten.
     """
     files = {
         kind: file
@@ -164,9 +165,7 @@ def export(
         print_json({"bag": str(path), "files": {k: str(f) for k, f in files.items()}, **facts})
     else:
         for file in files.values():
-            console.print(
-                f"{flight.sizes['time']} samples of {len(flight.data_vars)} signals in {file}"
-            )
+            print(f"{flight.sizes['time']} samples of {len(flight.data_vars)} signals in {file}")
 
 
 def _write_new(file: Path, content: bytes) -> None:

@@ -18,7 +18,6 @@ from ahv_analysis.command.console import (
     UsageError,
     check_domain,
     integer_option,
-    one_sentence,
     print_json,
     progress_bar,
     show_table,
@@ -62,7 +61,6 @@ CORES = os.cpu_count() or 1
 
 
 @monte_carlo.callback(invoke_without_command=True)
-@one_sentence
 def fly(
     context: typer.Context,
     controller: Annotated[
@@ -166,7 +164,6 @@ def _show(summary: dict[str, Any]) -> None:
 
 
 @monte_carlo.command()
-@one_sentence
 def rerun(
     folder: Annotated[Path, typer.Argument(help="Folder of a campaign.")],
     run: Annotated[int, typer.Argument(help="Number of the run.")],
@@ -175,7 +172,10 @@ def rerun(
     out: Annotated[Path | None, typer.Option(help="Folder for a bag of the run.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Fly one run of a campaign again, alone, and compare it with what the campaign found."""
+    """Fly one run of a campaign again, alone.
+
+    What it comes to is compared with what the campaign found, bit for bit.
+    """
     import numpy as np
 
     from ahv_analysis.campaign.batch import fly_alone
@@ -223,7 +223,6 @@ def rerun(
         show_table(f"run {run} again", [(name, str(value)) for name, value in result.items()])
 
 
-@one_sentence
 def table(
     runs: Annotated[
         int | None, integer_option("Trials a cell, instead of the report's numbers.", 1)
@@ -239,7 +238,7 @@ def table(
     ),
     as_json: Json = False,
 ) -> None:
-    """Fly Table 5.1 of the report and print it beside the report's counts."""
+    """Fly Table 5.1 of the report, beside its counts."""
     from ahv_analysis.campaign.table import fly_table, markdown, total_runs
 
     started = time.perf_counter()

@@ -3,10 +3,8 @@
 
 import json
 import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import wraps
 from typing import Annotated, Any
 
 import typer
@@ -23,10 +21,19 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from ahv_analysis.errors import BagError, CampaignError, GraphError
-from ahv_msgs_py.parameters import ParameterError
 
-console = Console()
+class Terminal(Console):
+    """A console that takes text as it is, and leaves a broken pipe to who calls."""
+
+    def __init__(self, **options: Any):
+        super().__init__(markup=False, emoji=False, **options)
+
+    def on_broken_pipe(self) -> None:
+        """Called while the error is handled."""
+        raise
+
+
+console = Terminal()
 HIGHEST_DOMAIN = 232
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
@@ -63,23 +70,6 @@ class UsageError(Exception):
     """Something asked for that cannot be had; one sentence, exit code 2."""
 
 
-def one_sentence(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn the errors of wrong input into one sentence and exit code 2."""
-
-    @wraps(command)
-    def guarded(*arguments: Any, **options: Any) -> None:
-        try:
-            command(*arguments, **options)
-        except (UsageError, ParameterError, BagError, CampaignError, OSError) as error:
-            print(f"ahv: {error}", file=sys.stderr)
-            raise typer.Exit(2) from error
-        except GraphError as error:
-            print(f"ahv: {error}", file=sys.stderr)
-            raise typer.Exit(1) from error
-
-    return guarded
-
-
 def check_domain() -> None:
     """Refuse a ROS domain that Fast DDS would refuse on stdout."""
     domain = os.environ.get("ROS_DOMAIN_ID", "0")
@@ -110,20 +100,21 @@ def progress_bar(
 ) -> Iterator[Callable[[int], None]]:
     """Progress on the terminal (stderr); the function it gives takes the work done so far."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         _RateColumn(unit),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), disable=hidden, transient=True) as bar:
+    with Progress(*columns, console=Terminal(stderr=True), disable=hidden, transient=True) as bar:
         task = bar.add_task(title, total=total)
         yield lambda done: bar.update(task, completed=done)
 
 
 def show_table(title: str, rows: list[tuple[str, str]]) -> None:
     """Print a table of names and values."""
-    sheet = Table(title=title, title_justify="left", show_header=False)
+    print(title)
+    sheet = Table(show_header=False)
     for name, value in rows:
         sheet.add_row(name, value)
     console.print(sheet)

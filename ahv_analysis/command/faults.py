@@ -14,7 +14,6 @@ from ahv_analysis.command.console import (
     check_domain,
     console,
     integer_option,
-    one_sentence,
     print_json,
     progress_bar,
 )
@@ -22,14 +21,13 @@ from ahv_msgs_py.node.faults import fault_rows
 
 COLUMNS = ("fault", "noticed by", "detection", "response", "latency")
 faults = typer.Typer(
-    help="What can go wrong in flight, how it is noticed and what happens then.",
+    help="What can go wrong in flight, and how it is noticed.",
     invoke_without_command=True,
     rich_markup_mode=None,
 )
 
 
 @faults.callback()
-@one_sentence
 def show(context: typer.Context, as_json: Json = False) -> None:
     """List every fault, how it is noticed, and what happens then."""
     if context.invoked_subcommand is not None:
@@ -45,7 +43,6 @@ def show(context: typer.Context, as_json: Json = False) -> None:
 
 
 @faults.command()
-@one_sentence
 def run(
     injections: Annotated[int, integer_option("Faults to inject.", 1)] = 200,
     seed: Annotated[int, integer_option("Seed of what is injected when.")] = 0,
@@ -54,11 +51,12 @@ def run(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Inject faults at random times into adaptive flights in real time, one process per node.
+    """Inject faults into flights at random times.
 
-    Nodes are killed and stopped, messages spoilt in every way, and others talk in between. Passed
-    if everything was noticed, no other node ended, alpha stayed within 5 deg, and the bags are
-    complete. Takes about 1.5 s an injection.
+    The flights are adaptive and in real time, with one process per node. Nodes are killed and
+    stopped, messages spoilt in every way, and others talk in between. Passed if everything was
+    noticed, no other node ended, alpha stayed within 5 deg, and the bags are complete. Takes
+    about 1.5 s an injection.
     """
     check_domain()
     from ahv_analysis.faults.campaign import run_campaign
@@ -89,7 +87,7 @@ def _print_report(report: dict[str, Any], folder: Path) -> None:
         )
     console.print(sheet)
     verdict = "passed" if report["passed"] else "FAILED"
-    console.print(
+    print(
         f"{verdict}: {report['injections']} faults in {len(report['flights'])} flights, "
         f"largest |alpha| {report['max_abs_alpha_deg']:.2f} deg; all of it in {folder}/faults.json"
     )

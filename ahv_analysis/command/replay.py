@@ -15,10 +15,10 @@ from ahv_analysis.command.console import (
     check_domain,
     console,
     number_option,
-    one_sentence,
     print_json,
     progress_bar,
 )
+from ahv_analysis.command.figures import write_figures
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import NAMESPACE
@@ -29,7 +29,6 @@ if TYPE_CHECKING:  # these need ROS, which other commands do without
     from ahv_analysis.replay.replay import Replay
 
 
-@one_sentence
 def replay(
     bag: Annotated[
         Path, typer.Argument(help="Folder of a bag: of `ahv fly`, or `ros2 bag record`.")
@@ -54,12 +53,15 @@ def replay(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Feed a recorded flight to the controllers again; compare what they command, bit for bit.
+    """Feed a recorded flight to the controllers again.
 
-    Ends with exit code 0 if all commands are alike, 1 if one differs.
+    What they command is compared with the record, bit for bit. Ends with exit code 0 if all
+    commands are alike, 1 if one differs.
     """
     if rate is not None and not (isfinite(rate) and rate > 0.0):
         raise UsageError(f"--rate is {rate:g}, but must be above 0")
+    if out is not None and any(out.glob("figure_*")):
+        raise UsageError(f"{out} holds figures already: choose another --out")
     check_domain()
     from ahv_analysis.replay.inputs import read_recording
     from ahv_analysis.replay.replay import replay as replay_flight
@@ -112,14 +114,9 @@ def _names(case: "Case", chosen: list[str] | None) -> list[str]:
 
 def _draw(recording: "Recording", flown: "Replay", out: Path, hidden: bool) -> list[Path]:
     from ahv_analysis.replay.figures import replay_figures
-    from ahv_analysis.report.figures import save_figures
 
     plates, draw = replay_figures(recording, flown)
-    try:
-        with progress_bar("drawing", len(plates), hidden, unit="figures") as progress:
-            return save_figures(plates, draw, out, progress)
-    except OSError as error:
-        raise UsageError(f"cannot write figures to {out}: {error}") from error
+    return write_figures(plates, draw, out, hidden)
 
 
 def _result(recording: "Recording", case: "Case", flown: "Replay") -> dict[str, Any]:
@@ -148,7 +145,8 @@ def _show(result: dict[str, Any], flown: "Replay", out: Path | None) -> None:
         f"{result['bag']}: {result['case']} replayed from {result['from_s']:g} s "
         f"to {result['to_s']:g} s"
     )
-    sheet = Table(title=title, title_justify="left")
+    print(title)
+    sheet = Table()
     for name in ("node", "command"):
         sheet.add_column(name, no_wrap=True)
     for name in ("compared", "differ", "by at most"):

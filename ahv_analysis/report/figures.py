@@ -13,6 +13,7 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 from ahv_analysis.bag.record import Array, FlightRecord
+from ahv_analysis.interrupt import signals_wait
 from ahv_plant.model.constants import DEGREES, UNSTART_ALPHA
 
 
@@ -258,6 +259,12 @@ def _scale(axis: pyplot.Axes, values: Array, bound: float | None) -> None:
     axis.set_ylim(low - margin, high + margin)
 
 
+def figure_files(plate: Plate, folder: Path) -> list[Path]:
+    """Files of a figure."""
+    name = f"figure_{plate.number.replace('.', '_')}"
+    return [folder / f"{name}.{kind}" for kind in ("png", "svg")]
+
+
 def save_figures(
     plates: Sequence[Plate],
     draw_plate: Callable[[Plate], Figure],
@@ -269,10 +276,10 @@ def save_figures(
     written = []
     for done, plate in enumerate(plates, 1):
         figure = draw_plate(plate)
-        for kind in ("png", "svg"):
-            path = folder / f"figure_{plate.number.replace('.', '_')}.{kind}"
-            metadata = {"Date": None} if kind == "svg" else None
-            figure.savefig(path, dpi=150, metadata=metadata)
+        for path in figure_files(plate, folder):
+            metadata = {"Date": None} if path.suffix == ".svg" else None
+            with signals_wait():
+                figure.savefig(path, dpi=150, metadata=metadata)
             written.append(path)
         pyplot.close(figure)
         progress(done)

@@ -6,19 +6,20 @@ from typing import Annotated
 
 import typer
 
-from ahv_analysis.command.console import Json, UsageError, one_sentence, print_json, progress_bar
+from ahv_analysis.command.console import Json, UsageError, print_json, progress_bar
+from ahv_analysis.interrupt import signals_wait
 
 
-@one_sentence
 def report(
     bags: Annotated[list[Path], typer.Argument(help="Folders of bags.", metavar="BAG")],
     out: Annotated[Path, typer.Option(help="Folder for the pages.")],
     as_json: Json = False,
 ) -> None:
-    """Write an HTML page for each flight, and one that overlays them if there are several.
+    """Write flights as HTML pages.
 
-    Each page is one file that needs nothing else, not even a network: what flew, the verdict,
-    metrics, interactive plots of every step with linked time axes, and the report's figures.
+    A page for each flight, and one that overlays them if there are several. Each page is one file
+    that needs nothing else, not even a network: what flew, the verdict, metrics, interactive
+    plots of every step with linked time axes, and the report's figures.
     """
     from ahv_analysis.report.page import draw_figures, render
     from ahv_analysis.report.page_flight import COMPARISON, read_flights
@@ -40,7 +41,8 @@ def report(
                 else:
                     flight = flights[done - 1]
                     page = render([flight], draw_figures(flight))
-                file.write_text(page, encoding="utf-8")
+                with signals_wait():
+                    file.write_text(page, encoding="utf-8", errors="backslashreplace")
                 progress(done)
     except OSError as error:
         raise UsageError(f"cannot write pages to {out}: {error.strerror or error}") from error

@@ -1,0 +1,167 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""The command `ahv fly`."""
+
+import json
+import time
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from ahv_analysis.command.console import (
+    Json,
+    UsageError,
+    check_domain,
+    integer_option,
+    number_option,
+    print_json,
+    progress_bar,
+    show_table,
+)
+from ahv_plant.dispersion import HIGHEST_LEVEL
+from ahv_plant.model.constants import STEP
+
+
+class CaseCommand(TyperCommand):
+    """A command whose help lists the cases."""
+
+    def format_epilog(self, context: Any, formatter: Any) -> None:
+        """List the cases."""
+        from ahv_analysis.flight.case import case_names
+
+        with formatter.section("Cases"):
+            formatter.write_text(", ".join(case_names()))
+
+
+class Engine(StrEnum):
+    """What flies a case."""
+
+    graph = "graph"
+    library = "library"
+
+
+def fly(
+    case: Annotated[str, typer.Argument(help="Name of a case, or a YAML file of one.")],
+    engine: Annotated[
+        Engine, typer.Option(help="The ROS graph, or the same laws in this process.")
+    ] = Engine.graph,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="100 Hz by the wall clock, not lockstep.")
+    ] = False,
+    processes: Annotated[
+        bool, typer.Option("--processes", help="One process per node, not all nodes in one.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the bag and the summary, which must not have them."),
+    ] = None,
+    duration: Annotated[
+        float | None, number_option("s", "Length of the flight, instead of the case's")
+    ] = None,
+    dispersion: Annotated[
+        str | None,
+        typer.Option(
+            help="Dispersion of the vehicle: a YAML file, or a level like 0.3 to draw one.",
+            metavar="FILE|LEVEL",
+        ),
+    ] = None,
+    seed: Annotated[int, integer_option("Seed of the campaign of a draw.")] = 0,
+    run: Annotated[int, integer_option("Number of the run of a draw.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Fly a case, record it and sum it up.
+
+    The bag goes to OUT/bag (MCAP), the summary to OUT/summary.json.
+    """
+    from ahv_analysis.bag.reader import read_bag
+    from ahv_analysis.flight.case import load_case
+    from ahv_analysis.flight.library import fly_library
+    from ahv_analysis.flight.summary import summarize
+
+    if engine == Engine.library and (realtime or processes):
+        raise UsageError("--realtime and --processes are for the graph, not for --engine library")
+    changes, draw = _dispersion(dispersion, seed, run)
+    if duration is not None:
+        changes["duration"] = duration
+    flight = load_case(case, changes, draw)
+    folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    bag, summary_file = folder / "bag", folder / "summary.json"
+    for path in (bag, summary_file):
+        if path.exists():
+            raise UsageError(f"{path} exists already: choose another --out")
+    with progress_bar(f"flying {flight.name}", flight.plant.steps, as_json) as progress:
+        if engine == Engine.graph:
+            check_domain()
+            fly_ros = _engine(processes)
+            ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
+        else:
+            ended_early, wall = fly_library(flight, bag, progress=progress)
+    record = read_bag(bag)
+    summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
+    summary["dispersion"] = flight.plant.truth.dispersion._asdict()
+    summary |= summarize(record, ended_early, flight.control)
+    summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
+    summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
+    if as_json:
+        print_json(summary)
+    else:
+        _print_summary(summary)
+    if ended_early:
+        raise typer.Exit(1)
+
+
+def _engine(processes: bool) -> Callable[..., tuple[str, float]]:
+    """Return what flies a case on the graph; only this needs ROS."""
+    from ahv_analysis.flight.one_process import fly_graph
+    from ahv_analysis.flight.process_per_node import fly_processes
+
+    return fly_processes if processes else fly_graph
+
+
+def _dispersion(choice: str | None, seed: int, run: int) -> tuple[dict[str, object], Any]:
+    """Plant parameters of the option --dispersion, and the Draw that they come from, if any."""
+    from ahv_analysis.flight.case import Draw, dispersion_parameters, load_dispersion
+    from ahv_plant.dispersion import draw_dispersion
+
+    if choice is None:
+        return {}, None
+    if choice.endswith((".yaml", ".yml")):
+        if not Path(choice).is_file():
+            raise UsageError(f"dispersion {choice} is not a file")
+        return load_dispersion(Path(choice)), None
+    try:
+        level = float(choice)
+    except ValueError:
+        level = -1.0
+    if not 0.0 <= level <= HIGHEST_LEVEL:
+        raise UsageError(
+            f"dispersion {choice!r} is neither a YAML file nor a level from 0 to {HIGHEST_LEVEL:g}"
+        )
+    changes = dispersion_parameters(draw_dispersion(level, seed, run))
+    return changes, Draw(level, seed, run)
+
+
+def _print_summary(summary: dict[str, Any]) -> None:
+    final = summary["final_state"]
+    low, high = summary["surface_range_deg"]
+    least, most = summary["throttle_range"]
+    verdict = "success" if summary["success"] else "FAILURE"
+    cause = "" if summary["success"] else summary["cause"].replace("_", " ")
+    why = cause, summary["ended_early"] or "flown to its end"
+    rows = [
+        ("verdict", f"{verdict}: {', '.join(filter(None, why))}"),
+        ("largest |alpha|", f"{summary['max_abs_alpha_deg']:.3f} deg (inlet unstart at 5 deg)"),
+        ("largest |beta|", f"{summary['max_abs_beta_deg']:.3f} deg"),
+        ("surfaces", f"{low:.2f} to {high:.2f} deg (stops at -40 and 30)"),
+        ("throttle", f"{least:.3f} to {most:.3f} (stops at 0.1 and 0.9)"),
+        ("fuel", f"{summary['fuel_kg']:.0f} kg"),
+        ("final speed u", f"{final['u']:.2f} m/s"),
+        ("final altitude", f"{final['h']:.1f} m"),
+        ("flown", f"{summary['steps']} steps in {summary['wall_s']:.2f} s"),
+        ("pace", f"{summary['real_time_factor']:.0f} times real time"),
+        ("bag", summary["bag"]),
+    ]
+    show_table(f"{summary['case']} on the {summary['engine']}", rows)

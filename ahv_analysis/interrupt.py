@@ -1,0 +1,68 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Signals that end a program: never in the middle of what must be whole.
+
+No signal raises an exception here. One that rises at any instruction may come to pass inside a
+callback of ROS, where it ends in a segmentation fault, or where Python ignores it.
+"""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+CLEAR_LINE_AND_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # after a progress bar
+
+_words: Callable[[], str] = str  # what is to be said of an interrupted command
+
+
+@contextmanager
+def signals_wait() -> Iterator[Callable[[], bool]]:
+    """What is done in here is not cut off: a signal has its effect when it is over.
+
+    The function that this gives tells whether one came, so that long work can end early and in
+    order. A signal that the process ignores stays ignored.
+    """
+    came: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False  # signals are the main thread's affair
+        return
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        for number, handler in before.items():
+            if handler is not signal.SIG_IGN:
+                signal.signal(number, lambda number, _: came.append(number))
+        yield lambda: bool(came)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])
+
+
+def end_on_signals() -> None:
+    """From now on a signal ends this process at once, with a sentence and 128 + its number."""
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(number, _end)
+
+
+@contextmanager
+def interrupted_says(words: Callable[[], str]) -> Iterator[None]:
+    """In here, an interrupted command says `words()`."""
+    global _words
+    before, _words = _words, words
+    try:
+        yield
+    finally:
+        _words = before
+
+
+def _end(number: int, frame: object) -> None:
+    said = " ".join(("ahv: interrupted", *filter(None, [_words()])))
+    # not through sys.stderr, which may be in the middle of a line; without the ways of an exit,
+    # which wait for threads
+    clear = CLEAR_LINE_AND_SHOW_CURSOR if os.isatty(2) else b""
+    os.write(2, clear + said.encode(errors="backslashreplace") + b"\n")
+    os._exit(128 + number)
