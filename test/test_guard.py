@@ -19,12 +19,15 @@ VALUES = (-0.1, -0.1, 0.0)
 LAYOUT = SURFACE_COMMAND.layout
 
 
+FIRST, TWIN = b"the first", b"its twin"  # GIDs
+
+
 class Air:
-    """What surrounds a guard: a clock that stands still unless moved, and other publishers."""
+    """What surrounds a guard: a clock that stands still unless moved, and its publishers."""
 
     def __init__(self, realtime=True):
         self.time = 0
-        self.publishers = 1
+        self.publishers = [FIRST]
         self.guard = Guard(
             SURFACE_COMMAND, self.general, lambda: self.time, realtime, lambda: self.publishers
         )
@@ -33,11 +36,11 @@ class Air:
     def general(data):
         raise MessageError("not of this layout")
 
-    def say(self, step, sequence, values=VALUES, now=None):
+    def say(self, step, values=VALUES, now=None, by=FIRST):
         """Send the command of a step; returns the fault that it was refused for, or None."""
         data = LAYOUT.encode(step * PERIOD, values)
         try:
-            self.guard.read(data, sequence, None if now is None else now * PERIOD)
+            self.guard.read(data, by, None if now is None else now * PERIOD)
         except Refusal as refusal:
             return refusal.fault
         return None
@@ -45,7 +48,7 @@ class Air:
 
 def test_messages_in_order_are_obeyed():
     air = Air()
-    assert [air.say(step, step + 1) for step in range(50)] == [None] * 50
+    assert [air.say(step) for step in range(50)] == [None] * 50
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -53,76 +56,88 @@ def test_messages_in_order_are_obeyed():
 def test_numbers_that_are_none_are_refused(value, place):
     values = [*VALUES]
     values[place] = value
-    assert Air().say(0, 1, values) == Fault.NOT_FINITE
+    assert Air().say(0, values) == Fault.NOT_FINITE
 
 
 def test_a_deflection_beyond_the_stops_is_refused():
-    assert Air().say(0, 1, (0.0, -2.0, 0.0)) == Fault.OUT_OF_RANGE
+    assert Air().say(0, (0.0, -2.0, 0.0)) == Fault.OUT_OF_RANGE
 
 
 def test_repeated_and_late_messages_are_refused():
     air = Air()
-    assert air.say(5, 1) is None
-    assert air.say(5, 2) == Fault.DUPLICATE
-    assert air.say(4, 3) == Fault.OUT_OF_ORDER
-    assert air.say(6, 4) is None
+    assert air.say(5) is None
+    assert air.say(5) == Fault.DUPLICATE
+    assert air.say(4) == Fault.OUT_OF_ORDER
+    assert air.say(6) is None
 
 
 def test_stamps_far_from_the_newest_state_are_refused_in_real_time():
     limit = STALE // PERIOD
-    assert Air().say(100, 1, now=100 + limit) is None
-    assert Air().say(100, 1, now=100 + limit + 1) == Fault.STALE
-    assert Air().say(100, 1, now=100 - limit) is None
-    assert Air().say(100, 1, now=100 - limit - 1) == Fault.WRONG_STAMP
-    assert Air(realtime=False).say(100, 1, now=0) is None  # in lockstep history comes late
+    assert Air().say(100, now=100 + limit) is None
+    assert Air().say(100, now=100 + limit + 1) == Fault.STALE
+    assert Air().say(100, now=100 - limit) is None
+    assert Air().say(100, now=100 - limit - 1) == Fault.WRONG_STAMP
+    assert Air(realtime=False).say(100, now=0) is None  # in lockstep history comes late
 
 
 def test_a_stamp_between_two_steps_is_refused():
     guard = Air().guard
     with pytest.raises(Refusal) as refusal:
-        guard.read(LAYOUT.encode(3, VALUES), 1, None)
+        guard.read(LAYOUT.encode(3, VALUES), FIRST, None)
     assert refusal.value.fault == Fault.WRONG_STAMP
 
 
 def test_other_bytes_are_refused():
     foreign = NamedVector(LAYOUT.frame, ["one", "two", "three"]).encode(0, VALUES)
     with pytest.raises(Refusal) as refusal:
-        Air().guard.read(foreign, 1, None)
+        Air().guard.read(foreign, FIRST, None)
     assert refusal.value.fault == Fault.MALFORMED
 
 
-@given(st.integers(1, 400))
-def test_a_second_publisher_is_never_obeyed_while_the_first_speaks(steps):
-    air = Air()
-    for step in range(200):
+@given(st.lists(st.sampled_from([FIRST, TWIN]), min_size=1), st.booleans())
+def test_a_twin_is_never_obeyed_while_the_first_is_there(order, realtime):
+    """Whoever is first, whoever's turn it is, and though both started with the flight."""
+    air = Air(realtime)
+    air.publishers = [TWIN, FIRST]
+    first = order[0]
+    for step, by in enumerate(order):
         air.time += PERIOD
-        assert air.say(step, 5000 + step, now=step) is None
-        assert air.say(step + 1, 1 + step * steps % 4000, now=step) == Fault.SECOND_PUBLISHER
+        expected = None if by == first else Fault.SECOND_PUBLISHER
+        assert air.say(2 * step, now=2 * step, by=by) == expected
+        if by != first:
+            assert air.say(2 * step, now=2 * step, by=first) is None
 
 
 def test_another_publisher_takes_over_after_a_silence():
     air = Air()
-    assert air.say(0, 500, now=0) is None
+    assert air.say(0, now=0) is None
     air.time = SILENCE
-    assert air.say(10, 1, now=10) == Fault.SECOND_PUBLISHER
+    assert air.say(10, now=10, by=TWIN) == Fault.SECOND_PUBLISHER
     air.time = SILENCE + 1
-    assert air.say(11, 2, now=11) is None
-    assert air.say(12, 501, now=12) == Fault.SECOND_PUBLISHER  # the first one has lost its turn
+    assert air.say(11, now=11, by=TWIN) is None
+    assert air.say(12, now=12) == Fault.SECOND_PUBLISHER  # the first one has lost its turn
 
 
-def test_in_lockstep_another_publisher_takes_over_when_it_is_alone():
+def test_in_lockstep_another_publisher_takes_over_when_the_first_has_left():
     air = Air(realtime=False)
-    assert air.say(0, 500) is None
-    air.time, air.publishers = 100 * SILENCE, 2
-    assert air.say(1, 1) == Fault.SECOND_PUBLISHER
-    air.publishers = 1
-    assert air.say(1, 2) is None
+    assert air.say(0) is None
+    air.time, air.publishers = 100 * SILENCE, [TWIN, FIRST]
+    assert air.say(1, by=TWIN) == Fault.SECOND_PUBLISHER
+    air.publishers = [TWIN]
+    assert air.say(1, by=TWIN) is None
 
 
 def test_a_publisher_of_which_much_was_lost_is_still_itself():
     air = Air()
-    assert air.say(0, 1, now=0) is None
-    assert air.say(90, 91, now=90) is None
+    assert air.say(0, now=0) is None
+    assert air.say(90, now=90) is None
+
+
+def test_what_a_publisher_says_wrongly_does_not_make_it_the_one_that_is_obeyed():
+    air = Air()
+    assert air.say(0, (math.nan, 0.0, 0.0), by=TWIN) == Fault.NOT_FINITE
+    assert air.say(0) is None
+    assert air.say(1, by=TWIN) == Fault.SECOND_PUBLISHER
 
 
 class Steps:

@@ -2,16 +2,14 @@
 """Node `recorder`: every topic of the graph into an MCAP bag, the bytes as they came."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import deserialize_message
-from rclpy.subscription import Subscription
 
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
@@ -20,6 +18,7 @@ from ahv_msgs_py.node.health import ERROR, OK
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.subscription import Subscription
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import (
     DIAGNOSTICS,
@@ -93,22 +92,14 @@ class RecorderNode(BaseNode):
                 message_type = message_class(type_name)
             except ModuleNotFoundError:
                 continue  # /tf without tf2_msgs installed: then nobody here can send it either
-            subscription = self.create_subscription(
-                message_type, name, lambda data: None, quality(durable), raw=True
-            )
+            subscription = Subscription(self, message_type, name, quality(durable))
             self._polled[name] = subscription
-            self._opened.append(partial(self.destroy_subscription, subscription))
+            self._opened.append(subscription.close)
             self._opened.append(partial(self._polled.pop, name))
         timer = self.create_timer(POLL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._opened.append(partial(self.destroy_timer, timer))
         self._opened.append(self._take)  # first of all to be done when the topics are closed
         self.announce(0, OK, f"recording to {self._bag.path}")
-
-    @property
-    def subscriptions(self) -> Iterator[Subscription]:
-        """Those that an executor is to call back for: not the topics, which are polled."""
-        polled = self._polled.values()
-        return (one for one in super().subscriptions if one not in polled)
 
     def _poll(self) -> None:
         """Take what has come; see whether that was all."""
@@ -128,7 +119,7 @@ class RecorderNode(BaseNode):
 
     def _take(self) -> None:
         for topic, subscription in self._polled.items():
-            messages = _waiting(subscription)
+            messages = [data for data, _ in subscription]
             if messages and self.failure is None:
                 try:
                     self._bag.write(topic, *messages)
@@ -172,23 +163,15 @@ class RecorderNode(BaseNode):
         return sum(steps + 1 - self._bag.counts[topic.name] for topic in topics)
 
     def conclude(self) -> None:
-        """Close the bag."""
+        """Close the topics, then the bag."""
+        self.close()
         if self._bag is not None:
-            self._take()
             try:
                 self._bag.close()
             except BagError as error:
                 if self.failure is None:
                     self._fail(error)
         self._bag = None
-
-
-def _waiting(subscription: Subscription) -> list[bytes]:
-    """Messages that have come on a topic, in their order."""
-    handle: Any = subscription.handle
-    with handle:
-        take = partial(handle.take_message, subscription.msg_type, True)
-        return [data for data, _ in iter(take, None)]
 
 
 def main() -> None:

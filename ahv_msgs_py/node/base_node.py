@@ -2,7 +2,6 @@
 """The shell that all nodes share: guarded topics as exact bytes, and the node's health."""
 
 import gc
-import inspect
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -22,6 +21,7 @@ from ahv_msgs_py.node.managed_node import ManagedNode
 from ahv_msgs_py.node.messages import diagnostics, general_reader, message_class
 from ahv_msgs_py.node.quality import SENDER_DEPTH, newest, quality
 from ahv_msgs_py.node.real_time import reserve_memory
+from ahv_msgs_py.node.subscription import Listener, gids
 from ahv_msgs_py.node.synchronizer import Fallback, RealTimeSteps, Stepwise, Values
 from ahv_msgs_py.parameters import Parameter, Value
 from ahv_msgs_py.topics import DIAGNOSTICS, QUEUE_DEPTH, STATE, LoopTopic
@@ -117,7 +117,7 @@ class BaseNode(ManagedNode):
     def receive(self, topic: LoopTopic, handle: Callable[[int, Values], None]) -> None:
         """Subscribe to a loop topic; `handle(stamp, values)` gets every message that is obeyed."""
         message_type = message_class(topic.layout.type_name)
-        publishers = partial(self.count_publishers, topic.name)
+        publishers = partial(gids, self, topic.name)
         guard = Guard(
             topic, general_reader(topic.layout), time.monotonic_ns, self.realtime, publishers
         )
@@ -125,12 +125,9 @@ class BaseNode(ManagedNode):
         judge = guard.read
         paces = topic is STATE
 
-        def read(*arguments: Any) -> None:
-            data, info = arguments[0] if len(arguments) == 1 else arguments
+        def read(data: bytes, publisher: bytes) -> None:
             try:
-                stamp, values = judge(
-                    data, info["publication_sequence_number"], None if paces else self.now
-                )
+                stamp, values = judge(data, publisher, None if paces else self.now)
             except Refusal as refusal:
                 self.fault(self.now or 0, refusal.fault, f"{topic.name}: {refusal}")
                 return
@@ -138,12 +135,8 @@ class BaseNode(ManagedNode):
                 self._state_came(stamp, guard)
             handle(stamp, values)
 
-        # two arguments ask for the message's number; the EventsExecutor gives both in one
-        read.__signature__ = inspect.signature(lambda data, info: None)
-        subscription = self.create_subscription(
-            message_type, topic.name, read, self.loop_quality(), raw=True
-        )
-        self._opened.append(partial(self.destroy_subscription, subscription))
+        listener = Listener(self, message_type, topic.name, self.loop_quality(), read)
+        self._opened.append(listener.close)
 
     def _state_came(self, stamp: int, guard: Guard) -> None:
         """Keep the time of the flight; a stamp that goes back starts a new one."""

@@ -71,7 +71,7 @@ class Fault(Enum):
     )
     SECOND_PUBLISHER = Response(
         "every receiver",
-        "the sequence number is not that of the publisher that is obeyed",
+        "the GID of its publisher is not that of the one that is obeyed, the first that was heard",
         "the message is refused; the other publisher is obeyed only after the first has been "
         "silent for 100 ms (in lockstep: has gone)",
         "at once",

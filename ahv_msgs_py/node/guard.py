@@ -1,7 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The guard of one input: every message is judged before anything is done with it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from math import isfinite
 from operator import le
 
@@ -10,7 +10,6 @@ from ahv_msgs_py.node.faults import PERIOD, SILENCE, STALE, Fault
 from ahv_msgs_py.topics import LoopTopic
 
 Values = tuple[float, ...]
-REACH = 3  # numbers by which a publisher may be ahead of one message a step
 
 
 class Refusal(Exception):
@@ -42,11 +41,10 @@ def refusal(topic: LoopTopic, stamp: int, values: Values) -> Refusal | None:
 class Guard:
     """Judges the messages of a topic; lets through one voice, in order, with values that can be.
 
-    A message does not say who sent it. The middleware numbers the messages of every publisher from
-    1 on, and that tells one from another: the publisher whose message was accepted first is obeyed
-    as long as its numbers go on, by one or so a step. Another one is refused until the first has
-    been silent for `SILENCE` of real time; in lockstep, where silence means nothing, until it is
-    the only one.
+    The middleware names the publisher of every message by a GID. The publisher whose message was
+    accepted first is obeyed until it is gone; messages of any other are refused. Gone is, in real
+    time, who has been silent for `SILENCE`: one that was killed is known to the middleware for
+    seconds yet. In lockstep, where silence means nothing, it is who has left the graph.
     """
 
     def __init__(
@@ -55,11 +53,11 @@ class Guard:
         general: Callable[[bytes], tuple[int, Values]],
         clock: Callable[[], int],
         realtime: bool,
-        publishers: Callable[[], int],
+        publishers: Callable[[], Collection[bytes]],
     ):
         """`general(data)` reads messages of another layout; `clock()` is steady, in ns.
 
-        `publishers()` counts the topic's publishers.
+        `publishers()` are the GIDs of all publishers of the topic.
         """
         self._topic = topic
         self._low = tuple(low for low, _ in topic.bounds)
@@ -69,29 +67,24 @@ class Guard:
         self._clock = clock
         self._realtime = realtime
         self._publishers = publishers
-        self._sequence: int | None = None
+        self._voice: bytes | None = None  # GID of the publisher that is obeyed
         self._stamp = -1  # [ns] of the last message that was accepted
         self._heard = 0  # [ns] when that was
 
-    def read(self, data: bytes, sequence: int, now: int | None) -> tuple[int, Values]:
+    def read(self, data: bytes, publisher: bytes, now: int | None) -> tuple[int, Values]:
         """Stamp [ns] and values of a message, or Refusal.
 
-        `sequence` is its number at its publisher, `now` the stamp of the newest state, if known.
+        `publisher` is the GID of its publisher, `now` the stamp of the newest state, if known.
         """
-        ahead = 1 if self._sequence is None else sequence - self._sequence
-        same_voice = 0 < ahead <= REACH
-        if same_voice and self._sequence is not None:
-            self._sequence = sequence  # though the message may yet be refused
         stamp, values = self._judge(data)
         if self._realtime and now is not None:
             self._check_age(stamp, now)
-        missed = (stamp - self._stamp) // PERIOD  # steps of which nothing came
-        if not (same_voice or 0 < ahead <= REACH + missed):
+        if publisher != self._voice:
             self._check_takeover()
-        if stamp <= self._stamp:
+        elif stamp <= self._stamp:
             known = f"stamp {stamp / 1e9:g} s after {self._stamp / 1e9:g} s"
             raise Refusal(Fault.DUPLICATE if stamp == self._stamp else Fault.OUT_OF_ORDER, known)
-        self._sequence, self._stamp = sequence, stamp
+        self._voice, self._stamp = publisher, stamp
         if self._realtime:
             self._heard = self._clock()
         return stamp, values
@@ -121,12 +114,15 @@ class Guard:
             raise Refusal(Fault.STALE, f"stamp {stamp / 1e9:g} s at {now / 1e9:g} s of the flight")
 
     def _check_takeover(self) -> None:
-        """Let another publisher take over, or refuse its message."""
-        others = self._publishers()
-        silent = self._realtime and self._clock() - self._heard > SILENCE
-        if not silent and (self._realtime or others > 1):
-            raise Refusal(Fault.SECOND_PUBLISHER, f"there are {others} publishers of the topic")
-        self._stamp = -1
+        """Refuse a message of another publisher while the one that is obeyed is there."""
+        if self._voice is None:
+            return
+        if self._realtime:
+            gone = self._clock() - self._heard > SILENCE
+        else:
+            gone = self._voice not in self._publishers()
+        if not gone:
+            raise Refusal(Fault.SECOND_PUBLISHER, "not by the publisher that is obeyed")
 
     def forget(self) -> None:
         """Take stamps from the beginning again: a new flight starts."""

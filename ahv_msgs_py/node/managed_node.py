@@ -134,8 +134,9 @@ class ManagedNode(LifecycleNode):
         """Do what has to be done before the node goes."""
 
     def destroy_node(self) -> None:
-        """Conclude, then go."""
+        """Conclude, close what is open, then go."""
         self.conclude()
+        self.close()
         super().destroy_node()
 
     def _transition(self, work: Callable[[], None]) -> TransitionCallbackReturn:
