@@ -202,8 +202,7 @@ class _Graph:
 
     def _complete(self, name: str, node: BaseNode) -> list[int]:
         """Stamps of the steps that a node has all inputs of; BagError if it can have none."""
-        heard = {subscription.topic_name for subscription in node.subscriptions}
-        inputs = [topic for topic in LOOP_TOPICS if topic.name in heard]
+        inputs = [topic for topic in LOOP_TOPICS if topic in node.heard]
         self._check(name, [*inputs, *answers(name)])
         states = self._stamps(STATE)
         common = set.intersection(*(self._stamps(topic) for topic in inputs))

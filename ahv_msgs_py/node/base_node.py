@@ -46,7 +46,7 @@ class BaseNode(ManagedNode):
         self.health = Health(time.monotonic_ns)
         self._state_heard = 0  # [ns] by the steady clock
         self._state_lost = False
-        self._input_guards: list[Guard] = []
+        self.heard: dict[LoopTopic, Guard] = {}  # what the node listens to of the loop
         self._diagnostics = self.create_publisher(
             DiagnosticArray, DIAGNOSTICS.name, quality(True, self.sender_depth)
         )
@@ -68,7 +68,7 @@ class BaseNode(ManagedNode):
     def close(self) -> None:
         """Close what was opened."""
         super().close()
-        self._input_guards.clear()
+        self.heard.clear()
 
     # Topics
 
@@ -121,7 +121,7 @@ class BaseNode(ManagedNode):
         guard = Guard(
             topic, general_reader(topic.layout), time.monotonic_ns, self.realtime, publishers
         )
-        self._input_guards.append(guard)
+        self.heard[topic] = guard
         judge = guard.read
         paces = topic is STATE
 
@@ -145,7 +145,7 @@ class BaseNode(ManagedNode):
             self._state_heard = time.monotonic_ns()
             self._state_lost = False
         if self.now is not None and stamp <= self.now:
-            for other in self._input_guards:
+            for other in self.heard.values():
                 if other is not guard:
                     other.forget()
             self.new_flight()

@@ -67,10 +67,13 @@ class Subscription:
 
     def __init__(self, node: Node, message_type: type, name: str, qos: QoSProfile):
         """Subscribe to a topic; until `close`."""
-        check_is_valid_msg_type(message_type)  # loads it as well
+        check_is_valid_msg_type(message_type)  # type: ignore[no-untyped-call]  # and loads it
         with node.handle:
             self.handle: Any = rclpy_implementation.Subscription(
-                node.handle, message_type, name, qos.get_c_qos_profile()
+                node.handle,
+                message_type,
+                name,
+                qos.get_c_qos_profile(),  # type: ignore[no-untyped-call]
             )
         self._name = name
         self._message = _Message(allocator=_rcutils.rcutils_get_default_allocator())
@@ -121,7 +124,7 @@ class Listener(Waitable):
         heard: Callable[[bytes, bytes], None],
     ):
         """`heard(data, gid)` gets every message."""
-        super().__init__(node.default_callback_group)
+        super().__init__(node.default_callback_group)  # type: ignore[no-untyped-call]
         self._node = node
         self._heard = heard
         self._subscription = Subscription(node, message_type, name, qos)
@@ -140,7 +143,7 @@ class Listener(Waitable):
 
     def get_num_entities(self) -> NumberOfEntities:
         """One subscription."""
-        return NumberOfEntities(num_subs=1)
+        return NumberOfEntities(num_subs=1)  # type: ignore[no-untyped-call]
 
     def add_to_wait_set(self, wait_set: Any) -> None:
         """Have the executor wait for it."""
