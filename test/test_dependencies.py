@@ -145,7 +145,8 @@ def test_packages_import_in_one_direction(package):
 
 
 SHELLS = [
-    f"ahv_msgs_py/node/{name}.py" for name in ("messages", "process", "quality", "ros_parameters")
+    f"ahv_msgs_py/node/{name}.py"
+    for name in ("messages", "process", "quality", "ros_parameters", "subscription")
 ]
 
 
