@@ -136,9 +136,11 @@ class Listener(Waitable):
         self._subscription.close()
 
     def __enter__(self) -> None:
+        """Keep the subscription while an executor uses it."""
         self._subscription.handle.__enter__()
 
     def __exit__(self, *error: Any) -> None:
+        """Let go of it."""
         self._subscription.handle.__exit__(*error)
 
     def get_num_entities(self) -> NumberOfEntities:
