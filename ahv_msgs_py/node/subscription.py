@@ -108,7 +108,7 @@ class Subscription:
 
 
 def gids(node: Node, topic: str) -> list[bytes]:
-    """GIDs of the publishers of a topic that are known to the middleware."""
+    """Every publisher of a topic that the middleware knows, by its GID."""
     return [bytes(info.endpoint_gid) for info in node.get_publishers_info_by_topic(topic)]
 
 
