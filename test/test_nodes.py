@@ -173,6 +173,7 @@ def test_an_inactive_node_does_not_answer(graph):
         ("outer_intermediate", {"altidude": 1.0}, "altidude"),
         ("plant", {"initial.h": 48000.0}, "initial altitude"),
         ("recorder", {"on_error": "cry"}, "on_error is 'cry'"),
+        ("plant", {"use_sim_time": True}, "use_sim_time is True"),
     ],
 )
 def test_bad_parameters_fail_in_configure_in_one_sentence(name, values, words, graph):
@@ -196,15 +197,20 @@ def test_bad_parameters_fail_in_configure_in_one_sentence(name, values, words, g
         ("inner_loop", {"adaptive": False}),
         ("inner_loop", {"k_P": 1.0}),
         ("plant", {"initial__h": 20000.0}),
+        ("plant", {"use_sim_time": True}),
+        ("recorder", {"use_sim_time": True}),
     ],
 )
-def test_what_cannot_change_in_flight_is_refused_and_nothing_changes(name, values, graph):
-    flown = graph(name)
+def test_what_cannot_change_in_flight_is_refused_and_nothing_changes(
+    name, values, graph, tmp_path
+):
+    flown = graph(name, recorder={"bag": str(tmp_path / "bag")})
     flown.nodes[name].bring_up()
     before = dict(flown.nodes[name].settings)
     result = flown.set(name, **values)
     assert not result.successful
     assert result.reason
+    assert not flown.nodes[name].get_clock().ros_time_is_active
     assert flown.nodes[name].settings == before
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
 from rclpy.serialization import deserialize_message
 
 from ahv_analysis.bag.writer import BagWriter
@@ -96,7 +95,7 @@ class RecorderNode(BaseNode):
             self._polled[name] = subscription
             self._opened.append(subscription.close)
             self._opened.append(partial(self._polled.pop, name))
-        timer = self.create_timer(POLL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        timer = self.create_timer(POLL, self._poll)
         self._opened.append(partial(self.destroy_timer, timer))
         self._opened.append(self._take)  # first of all to be done when the topics are closed
         self.announce(0, OK, f"recording to {self._bag.path}")

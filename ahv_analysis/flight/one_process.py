@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
-from rclpy.clock import Clock, ClockType
 from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
@@ -107,8 +106,7 @@ def _spin(
     for node in (plant, recorder):
         if node is not None:
             node.finished.add_done_callback(lambda _: over.done() or over.set_result(None))
-    steady = Clock(clock_type=ClockType.STEADY_TIME)
-    plant.create_timer(LOOK, lambda: progress(plant.step), clock=steady)
+    plant.create_timer(LOOK, lambda: progress(plant.step))
     last, since = -1, time.monotonic()
     while not over.done():
         executor.spin_until_future_complete(over, LOOK)

@@ -14,7 +14,6 @@ from pathlib import Path
 from types import TracebackType
 
 import rclpy
-from rclpy.clock import Clock, ClockType
 
 from ahv_analysis.errors import GraphError
 from ahv_analysis.faults.faulty_node import faulty
@@ -52,7 +51,7 @@ class FlightReport:
         def progress() -> None:
             self._step.value = plant.step
 
-        plant.create_timer(LOOK, progress, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        plant.create_timer(LOOK, progress)
         plant.finished.add_done_callback(lambda end: self._tell.send(end.result()))
 
     @property

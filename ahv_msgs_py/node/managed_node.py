@@ -8,11 +8,13 @@ from typing import Any
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
+from rclpy.timer import Timer
 
-from ahv_msgs_py.node.ros_parameters import declare_parameters
+from ahv_msgs_py.node.ros_parameters import SIMULATED_TIME, check_time, declare_parameters
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import NAMESPACE
 
@@ -66,12 +68,20 @@ class ManagedNode(LifecycleNode):
             self._change_state, self._service_change_state.callback
         )
 
+    def create_timer(self, period: float, callback: Callable[[], None], **options: Any) -> Timer:
+        """Create a timer by the steady clock: whoever sets the system's clock moves no step."""
+        options.setdefault("clock", Clock(clock_type=ClockType.STEADY_TIME))
+        return super().create_timer(period, callback, **options)
+
     # Parameters
 
     def _change(self, parameters: Sequence[RosParameter]) -> SetParametersResult:
         """Take parameters that change in flight; they are in force from the next step on."""
         own = [entry for entry in parameters if entry.name in self._known and self.settings]
         try:
+            for entry in parameters:
+                if entry.name == SIMULATED_TIME:
+                    check_time(self.get_name(), entry.value)
             given = {
                 entry.name: self._known[entry.name].check(self.get_name(), entry.value)
                 for entry in own

@@ -6,12 +6,24 @@ from collections.abc import Mapping
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from ahv_msgs_py.parameters import SHARED, Parameter, Value, check_parameters
+from ahv_msgs_py.parameters import SHARED, Parameter, ParameterError, Value, check_parameters
+
+SIMULATED_TIME = "use_sim_time"  # what ROS gives to every node
+
+
+def check_time(name: str, value: object) -> None:
+    """Refuse simulated time for the node `name`; ParameterError."""
+    if value is not False:
+        raise ParameterError(
+            f"{name}: {SIMULATED_TIME} is {value!r}, but must be False: nodes go by the stamps of "
+            "the plant's states, in real time by the steady clock"
+        )
 
 
 def declare_parameters(node: Node, known: Mapping[str, Parameter]) -> dict[str, Value]:
     """Check what `node` was given, then declare all it knows; ParameterError if it is wrong."""
-    ignored = {"use_sim_time", "start_type_description_service", *SHARED} - {*known}
+    check_time(node.get_name(), node.get_parameter(SIMULATED_TIME).value)
+    ignored = {SIMULATED_TIME, "start_type_description_service", *SHARED} - {*known}
     given = {
         key: parameter.value
         for key, parameter in node.get_parameters_by_prefix("").items()
