@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ahv_msgs_py.layout import Layout, NamedVector, StampedAcceleration, StampedVector
 
-NAMESPACE = "/ahv"
+NAMESPACE = "/ahv"  # of a vehicle, unless it is given another: then its topics are there
 BODY_FRAME = "base_link_frd"
 EARTH_FRAME = "map_ned"
 ROBOTICS_FRAMES = ("map", "base_link")  # east-north-up, forward-left-up, for tools that assume it
@@ -29,10 +29,20 @@ LEARNER_NAMES = (
 SURFACE_NAMES = ("right_elevon", "left_elevon", "rudder")
 
 
+def relative(name: str) -> str:
+    """Name of a topic as nodes open it: within their namespace, or absolute as `/clock`."""
+    return name.removeprefix(f"{NAMESPACE}/")
+
+
+def within(namespace: str, name: str) -> str:
+    """Name that a topic has in a namespace."""
+    return name if relative(name) == name else f"{namespace.rstrip('/')}/{relative(name)}"
+
+
 class LoopTopic(NamedTuple):
     """A topic of the control loop: fixed layout, exact doubles."""
 
-    name: str
+    name: str  # in the default namespace
     layout: Layout
     units: str
     bounds: tuple[tuple[float, float], ...]  # of every field: beyond, a value cannot be meant
@@ -109,7 +119,7 @@ LEARNER = LoopTopic(
 )
 LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)
 LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS
-BY_NAME = {topic.name.rpartition("/")[2]: topic for topic in LOOP_TOPICS}  # as the graph has them
+BY_NAME = {relative(topic.name): topic for topic in LOOP_TOPICS}  # as the graph has them
 
 CLOCK = ViewerTopic("/clock", "rosgraph_msgs/msg/Clock", 4, "simulated time at 100 Hz")
 ODOMETRY = ViewerTopic(

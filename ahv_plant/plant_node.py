@@ -102,9 +102,9 @@ class PlantNode(BaseNode):
                 self.receive(held.topic, partial(self._hold, held))
         else:
             topics = (SURFACE_COMMAND, THROTTLE_COMMAND)
-            steps = Stepwise([topic.name for topic in topics], self._answered)
+            steps = Stepwise([self.full_name(topic) for topic in topics], self._answered)
             for topic in topics:
-                self.receive(topic, partial(self._take, steps, topic.name))
+                self.receive(topic, partial(self._take, steps, self.full_name(topic)))
         viewers = quality(True, self.sender_depth)
         self._send_clock = self.publisher(CLOCK.type_name, CLOCK.name, viewers)
         self._odometry = self.publisher(ODOMETRY.type_name, ODOMETRY.name, viewers)
@@ -201,10 +201,11 @@ class PlantNode(BaseNode):
         age = stamp - held.stamp
         if age == 0:
             return held.values
-        self.fault(stamp, Fault.LATE, f"{held.topic.name}: the last one is {age * 1e-9:g} s old")
+        name = self.full_name(held.topic)
+        self.fault(stamp, Fault.LATE, f"{name}: the last one is {age * 1e-9:g} s old")
         if age <= HOLD:
             return held.values
-        self.fault(stamp, Fault.COMMAND_LOST, f"{held.topic.name}: none for {age * 1e-9:g} s")
+        self.fault(stamp, Fault.COMMAND_LOST, f"{name}: none for {age * 1e-9:g} s")
         return None
 
     # Both

@@ -56,13 +56,15 @@ class _Enough(Exception):
     """All recorders are dead: the flight need not go on."""
 
 
+RECORDER = [sys.executable, "-c", "from ahv_analysis.bag.recorder_node import main; main()"]
+
+
 def kill_recorders(folder: Path, moments: Sequence[float], domain: int) -> list[Kill]:
     """Fly with one recorder per moment [s], each killed so long after the first step."""
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
-    program = Path(sys.executable).parent / "recorder"
     bags = [folder / f"bag{number}" for number in range(len(moments))]
     recorders = [
-        subprocess.Popen([program, "--ros-args", "-p", f"bag:={bag}"], env=environment)
+        subprocess.Popen([*RECORDER, "--ros-args", "-p", f"bag:={bag}"], env=environment)
         for bag in bags
     ]
     plants: list[PlantNode] = []

@@ -5,7 +5,6 @@ import os
 import random
 import resource
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -30,7 +29,7 @@ from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, STATE
 from test.bags import mcap_of
-from test.kill_recorder import kill_recorders
+from test.kill_recorder import RECORDER, kill_recorders
 
 SMALL = 600_000  # [bytes] a disk that takes a few chunks, and what DDS wants of memory
 PATIENCE = 20.0  # [s] for something that comes in a fraction of a second
@@ -165,9 +164,8 @@ def test_a_folder_that_takes_no_bag_is_named(folder):
 
 def test_the_recorder_as_a_program_names_what_is_wrong(tmp_path):
     (tmp_path / "bag").mkdir()
-    program = Path(sys.executable).parent / "recorder"
     options = ["--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
-    result = subprocess.run([program, *options], capture_output=True, text=True)
+    result = subprocess.run([*RECORDER, *options], capture_output=True, text=True)
     assert result.returncode == 2
     assert f"recorder: bag: cannot write a bag to {tmp_path / 'bag'}: it exists already" in (
         result.stderr.splitlines()

@@ -3,7 +3,7 @@
 
 import json
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,12 +23,16 @@ from ahv_msgs_py.topics import (
     LEARNER,
     LEARNER_TOPICS,
     LOOP_TOPICS,
+    NAMESPACE,
     NOMINAL_TOPICS,
     RATE_COMMAND,
     STATE,
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
     LoopTopic,
+    ViewerTopic,
+    relative,
+    within,
 )
 
 
@@ -46,6 +50,15 @@ class Bag(NamedTuple):
     path: Path
     metadata: dict[str, Any]  # of metadata.yaml
     topics: dict[str, Recorded]  # by name, those without messages too
+    namespace: str = NAMESPACE  # of the vehicle that flew
+
+    def name(self, topic: LoopTopic | ViewerTopic) -> str:
+        """Name of a topic in this bag."""
+        return within(self.namespace, topic.name)
+
+    def recorded(self, topic: LoopTopic | ViewerTopic) -> Recorded | None:
+        """What the bag holds of a topic."""
+        return self.topics.get(self.name(topic))
 
 
 def read_bag(path: Path) -> FlightRecord:
@@ -82,7 +95,27 @@ def load_bag(path: Path) -> Bag:
     if mode == "message":
         for recorded in topics.values():
             recorded.messages[:] = map(_decompressed, recorded.messages)
-    return Bag(path, metadata, topics)
+    return Bag(path, metadata, topics, _namespace(path, topics))
+
+
+def _namespace(path: Path, topics: Mapping[str, Recorded]) -> str:
+    """Namespace of the vehicle that a bag is of: where its state and its surface command are."""
+    found = [
+        namespace
+        for name in topics
+        for namespace in [name.removesuffix(f"/{relative(STATE.name)}")]
+        if name == within(namespace, STATE.name)
+        and all(
+            (recorded := topics.get(within(namespace, topic.name))) and recorded.messages
+            for topic in (STATE, SURFACE_COMMAND)
+        )
+    ]
+    if len(found) > 1:
+        raise BagError(
+            f"{path} holds the flights of {len(found)} vehicles, {' and '.join(sorted(found))}: "
+            "record each into a bag of its own"
+        )
+    return found[0] if found else NAMESPACE
 
 
 def _collect(pieces: Sequence[Piece], topics: dict[str, Recorded]) -> None:
@@ -105,7 +138,7 @@ def _collect(pieces: Sequence[Piece], topics: dict[str, Recorded]) -> None:
 def flight_of(bag: Bag) -> FlightRecord:
     """The flight in a bag, as `read_bag` gives it."""
     series = {topic: _series(bag, topic) for topic in LOOP_TOPICS}
-    missing = [topic.name for topic in required_topics(bag) if not len(series[topic][0])]
+    missing = [bag.name(topic) for topic in required_topics(bag) if not len(series[topic][0])]
     if missing:
         held = ", ".join(name for name, topic in bag.topics.items() if topic.messages)
         raise BagError(
@@ -140,7 +173,7 @@ def required_topics(bag: Bag) -> Sequence[LoopTopic]:
     notes = notes_of(bag.metadata)
     adaptive = notes is not None and notes["parameters"]["inner_loop"]["adaptive"]
     there = {name for name, topic in bag.topics.items() if topic.messages}
-    learned = any(topic.name in there for topic in LEARNER_TOPICS)
+    learned = any(bag.name(topic) in there for topic in LEARNER_TOPICS)
     return LOOP_TOPICS if adaptive or learned else NOMINAL_TOPICS
 
 
@@ -167,12 +200,12 @@ def _decompressed(data: bytes) -> bytes:
 def _series(bag: Bag, topic: LoopTopic) -> tuple[NDArray[np.int64], Array]:
     """Stamps (n,) [ns] in ascending order and values (n, fields) of a topic."""
     width = len(topic.layout.fields)
-    recorded = bag.topics.get(topic.name)
+    recorded = bag.recorded(topic)
     if recorded is None or not recorded.messages:
         return np.empty(0, np.int64), np.empty((0, width))
     if recorded.type_name != topic.layout.type_name:
         raise BagError(
-            f"{bag.path}: {topic.name} is of type {recorded.type_name}, "
+            f"{bag.path}: {bag.name(topic)} is of type {recorded.type_name}, "
             f"but must be {topic.layout.type_name}"
         )
     messages = recorded.messages
@@ -182,14 +215,14 @@ def _series(bag: Bag, topic: LoopTopic) -> tuple[NDArray[np.int64], Array]:
         try:
             read = [_general(topic, messages[place]) for place in others]
         except MessageError as error:
-            raise BagError(f"{bag.path}: {topic.name}: {error}") from error
+            raise BagError(f"{bag.path}: {bag.name(topic)}: {error}") from error
         stamps = np.concatenate((stamps, [stamp for stamp, _ in read]))
         values = np.concatenate((values, [row for _, row in read]))
     stamps, first, again = np.unique(stamps, return_index=True, return_inverse=True)
     if len(first) < len(messages) and values[first][again].tobytes() != values.tobytes():
         raise BagError(
             f"{bag.path} holds more than one flight, or messages of another publisher: "
-            f"two messages on {topic.name} differ and have one stamp"
+            f"two messages on {bag.name(topic)} differ and have one stamp"
         )
     return stamps, values[first]
 

@@ -26,6 +26,8 @@ from ahv_msgs_py.topics import (
     NOMINAL_TOPICS,
     VIEWER_TOPICS,
     LoopTopic,
+    relative,
+    within,
 )
 
 STOP, CONTINUE = "stop", "continue"
@@ -39,6 +41,7 @@ RECORDER_PARAMETERS = (
         f"{CONTINUE} lets them go on without a record",
     ),
 )
+PLANT = f"{NAMESPACE}/plant"  # who says that the flight is over
 POLL = 0.02  # [s] of wall time between looks at the topics
 POLLS = 5  # looks that a chunk has the messages of
 QUIET = 0.5  # [s] after the end of a flight in real time, for what is still under way
@@ -76,7 +79,13 @@ class RecorderNode(BaseNode):
             )
         try:
             self._bag = BagWriter(
-                Path(str(settings["bag"])), str(settings["notes"]), background=self.realtime
+                Path(str(settings["bag"])),
+                str(settings["notes"]),
+                background=self.realtime,
+                names={
+                    topic.name: self.resolve_topic_name(relative(topic.name))
+                    for topic in (*LOOP_TOPICS, *VIEWER_TOPICS)
+                },
             )
         except BagError as error:
             raise ParameterError(f"recorder: bag: {error}") from error
@@ -91,7 +100,7 @@ class RecorderNode(BaseNode):
                 message_type = message_class(type_name)
             except ModuleNotFoundError:
                 continue  # /tf without tf2_msgs installed: then nobody here can send it either
-            subscription = Subscription(self, message_type, name, quality(durable))
+            subscription = Subscription(self, message_type, relative(name), quality(durable))
             self._polled[name] = subscription
             self._opened.append(subscription.close)
             self._opened.append(partial(self._polled.pop, name))
@@ -144,13 +153,13 @@ class RecorderNode(BaseNode):
         """Learn from the plant that the flight is over, and after how many steps."""
         for status in deserialize_message(data, DiagnosticArray).status:
             facts = {fact.key: fact.value for fact in status.values}
-            if status.name == f"{NAMESPACE}/plant" and "over" in facts:
+            if status.name == within(self.get_namespace(), PLANT) and "over" in facts:
                 self._steps = int(facts["steps"])
                 self._over = time.monotonic()
                 self._flown = [
                     topic
                     for topic in LOOP_TOPICS
-                    if topic in NOMINAL_TOPICS or self.count_publishers(topic.name)
+                    if topic in NOMINAL_TOPICS or self.count_publishers(relative(topic.name))
                 ]
 
     def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:

@@ -2,7 +2,7 @@
 """Writing a bag: message bytes as they come, in chunks."""
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from importlib.metadata import version
 from itertools import groupby
@@ -78,17 +78,24 @@ class BagWriter:
     is on disk stays.
     """
 
-    def __init__(self, path: Path, notes: str = "", background: bool = False):
+    def __init__(
+        self,
+        path: Path,
+        notes: str = "",
+        background: bool = False,
+        names: Mapping[str, str] | None = None,
+    ):
         """Create the bag folder `path`; BagError if it exists or cannot be made.
 
         `notes` are filed with the bag; `ahv fly` writes the parameters of the flight there as
-        JSON.
+        JSON. `names` are those of the topics of a vehicle that flies in another namespace.
         """
         self.path = path
         self.counts: dict[str, int] = {}
         self.failure: BagError | None = None
         self._custom = {NOTES: notes}
         self._name = f"{path.name}.mcap"
+        self._names = names or {}
         self.now = 0  # [ns] latest stamp
         self._inboxes: dict[str, _Inbox] = {}
         self._topics: dict[int, Topic] = {}
@@ -124,7 +131,9 @@ class BagWriter:
                 definition, _ = store.generate_msgdef(type_name, ros_version=2)
                 data = definition.encode()
                 self._file.add_schema(Schema(schemas[type_name], data, "ros2msg", type_name))
-            topic = Topic(name, type_name, qos, store.hash_rihs01(type_name))
+            topic = Topic(
+                self._names.get(name, name), type_name, qos, store.hash_rihs01(type_name)
+            )
             self._file.add_channel(topic.channel(number, schemas[type_name]))
             self._topics[number] = topic
             self._inboxes[name] = _Inbox(number, stamp_offset, [])

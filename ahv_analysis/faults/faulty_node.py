@@ -14,7 +14,7 @@ from ahv_msgs_py.layout import Layout, NamedVector
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import PERIOD
 from ahv_msgs_py.node.quality import quality
-from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, LoopTopic
+from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, LoopTopic, relative
 
 INJECT = f"{NAMESPACE}/inject"  # what to send wrongly, as JSON: topic, kind, count
 _TOPICS = {topic.name: topic for topic in LOOP_TOPICS}
@@ -81,7 +81,7 @@ class FaultyMixin(BaseNode):
     def start(self) -> None:
         """Open the topics, and the one for orders."""
         self._faulty: dict[str, _FaultyPublisher] = {}
-        self.create_subscription(String, INJECT, self._order, quality(durable=False))
+        self.create_subscription(String, relative(INJECT), self._order, quality(durable=False))
         super().start()
 
     def publisher(

@@ -14,10 +14,11 @@ from ahv_analysis.errors import GraphError
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.library import fly
 from ahv_msgs_py.graph import NODES
+from ahv_msgs_py.namespace import ros_arguments
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.network import keep_to_this_machine
-from ahv_msgs_py.topics import LOOP_TOPICS, NOMINAL_TOPICS, STATE, LoopTopic
+from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
 LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
@@ -34,13 +35,15 @@ def fly_graph(
     bag: Path | None,
     *,
     domain: int | None = None,
+    namespace: str = NAMESPACE,
     realtime: bool = False,
     on_error: str = STOP,
     progress: Callable[[int], None] = lambda steps: None,
 ) -> tuple[str, float]:
     """Fly `case` on a graph of its own context; record to `bag` unless that is None.
 
-    In lockstep, or with `realtime` at 100 Hz by the wall clock. `progress(steps)` is called now
+    Another vehicle may fly in the same `domain` at the same time, in another `namespace`. In
+    lockstep, or with `realtime` at 100 Hz by the wall clock. `progress(steps)` is called now
     and then. Returns why the flight ended early (empty if it did not) and the seconds from the
     first state to the last command. Raises ParameterError for settings that a node refuses,
     GraphError if the graph stops and BagError if the disk fails; with `on_error` CONTINUE the
@@ -48,7 +51,7 @@ def fly_graph(
     """
     keep_to_this_machine()
     context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain)
+    rclpy.init(args=ros_arguments(namespace), context=context, domain_id=domain)
     executor = EventsExecutor(context=context)
     nodes: list[BaseNode] = []
     recorder = None
@@ -73,9 +76,10 @@ def fly_graph(
         started = time.perf_counter()
         _spin(executor, plant, recorder, progress)
         wall = time.perf_counter() - started
-        if plant.count_publishers(STATE.name) > 1:
+        if plant.count_publishers(plant.full_name(STATE)) > 1:
             raise GraphError(
-                "another plant flew in the same ROS domain: set ROS_DOMAIN_ID to one of your own"
+                f"another plant flew in the namespace {namespace} of this ROS domain: "
+                "set ROS_DOMAIN_ID to one of your own"
             )
         if recorder is not None:
             _drain(executor, recorder, loop_topics(case), plant.step)

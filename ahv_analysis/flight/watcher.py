@@ -35,7 +35,9 @@ class Watcher:
         stamp = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
         for status in message.status:
             facts = {fact.key: fact.value for fact in status.values}
-            name = status.name.rpartition("/")[2]
+            namespace, _, name = status.name.rpartition("/")
+            if namespace != NAMESPACE:
+                continue  # of another vehicle
             self.statuses.append((stamp, name, status.level[0], status.message, facts))
             if name == "plant":
                 self.step = stamp // STEP_NS

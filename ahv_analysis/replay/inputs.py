@@ -13,13 +13,13 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from ahv_analysis.bag.reader import Bag, load_bag, notes_of
+from ahv_analysis.bag.reader import Recorded, load_bag, notes_of
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
 from ahv_msgs_py.node.guard import Guard, Refusal
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.topics import DIAGNOSTICS, LOOP_TOPICS, NAMESPACE, LoopTopic
+from ahv_msgs_py.topics import DIAGNOSTICS, LOOP_TOPICS, LoopTopic
 from ahv_plant.model.constants import STEP_NS
 
 LEARNER_NODE = "disturbance_learner"
@@ -51,6 +51,7 @@ class Recording(NamedTuple):
     topics: dict[LoopTopic, dict[int, Message]]  # by stamp [ns], rising; topics with messages only
     changes: list[Change]
     refused: int  # messages that no receiver obeys
+    namespace: str  # of the vehicle that flew
 
 
 def read_recording(path: Path) -> Recording:
@@ -62,18 +63,18 @@ def read_recording(path: Path) -> Recording:
     topics: dict[LoopTopic, dict[int, Message]] = {}
     refused = 0
     for topic in LOOP_TOPICS:
-        recorded = _messages(bag, topic.name, topic.layout.type_name)
+        recorded = _messages(bag.recorded(topic), topic.layout.type_name)
         obeyed = _obeyed(topic, recorded)
         refused += len(recorded) - len(obeyed)
         if obeyed:
             topics[topic] = obeyed
-    changes = _changes(_messages(bag, DIAGNOSTICS.name, DIAGNOSTICS.type_name))
-    return Recording(path, notes_of(bag.metadata), topics, changes, refused)
+    diagnostics = _messages(bag.recorded(DIAGNOSTICS), DIAGNOSTICS.type_name)
+    changes = _changes(diagnostics, bag.namespace)
+    return Recording(path, notes_of(bag.metadata), topics, changes, refused, bag.namespace)
 
 
-def _messages(bag: Bag, name: str, type_name: str) -> list[bytes]:
+def _messages(recorded: Recorded | None, type_name: str) -> list[bytes]:
     """Messages of a topic, if it is of the type that we know."""
-    recorded = bag.topics.get(name)
     return recorded.messages if recorded and recorded.type_name == type_name else []
 
 
@@ -109,16 +110,16 @@ def _deserialized(data: bytes, message_type: type) -> Any:
         raise MessageError("the bytes are no message of the topic's type") from error
 
 
-def _changes(diagnostics: Iterable[bytes]) -> list[Change]:
-    """Changes of parameters that nodes announced, in the order of their stamps."""
+def _changes(diagnostics: Iterable[bytes], namespace: str) -> list[Change]:
+    """Changes of parameters that nodes of a namespace announced, in the order of their stamps."""
     changes = []
     for data in diagnostics:
         with suppress(MessageError):
             message = _deserialized(data, DiagnosticArray)
             stamp = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
             for status in message.status:
-                namespace, _, node = status.name.rpartition("/")
-                if (namespace, status.message) == (NAMESPACE, CHANGED):
+                where, _, node = status.name.rpartition("/")
+                if (where, status.message) == (namespace, CHANGED):
                     # the learner goes through step k when state k + 1 comes
                     first = stamp + STEP_NS if node == LEARNER_NODE else stamp
                     values = {fact.key: _value(fact.value) for fact in status.values}

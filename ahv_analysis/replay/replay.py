@@ -32,6 +32,7 @@ from ahv_analysis.replay.inputs import LEARNER_NODE, Change, Recording
 from ahv_analysis.replay.result import Comparison, compare
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.namespace import ros_arguments
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
@@ -46,6 +47,7 @@ from ahv_msgs_py.topics import (
     LOOP_TOPICS,
     STATE,
     LoopTopic,
+    within,
 )
 from ahv_plant.model.constants import STEP_NS
 
@@ -119,8 +121,9 @@ def _remapping(recording: Recording, names: Sequence[str]) -> list[str]:
     for name in names:
         for topic in (*answers(name), DIAGNOSTICS):
             if topic is DIAGNOSTICS or topic in recording.topics:
-                rules += ["-r", f"{name}:{topic.name}:={REPLAYED}{topic.name}"]
-    return ["--ros-args", *rules]
+                flown = within(recording.namespace, topic.name)
+                rules += ["-r", f"{name}:{flown}:={REPLAYED}{flown}"]
+    return [*ros_arguments(recording.namespace), *rules]
 
 
 @contextmanager
@@ -165,13 +168,17 @@ class _Graph:
         for name in names:
             self._nodes[name] = NODES[name].node_class(case.parameters[name], context)
 
+    def _name(self, topic: LoopTopic) -> str:
+        """Name of a topic where the recorded vehicle flew."""
+        return within(self._recording.namespace, topic.name)
+
     def refuse_company(self) -> None:
         """Raise GraphError if somebody flies here: recorded commands must not reach a vehicle."""
         self._spin(LISTEN)
         for topic in LOOP_TOPICS:
-            if self._feeder.count_publishers(topic.name):
+            if self._feeder.count_publishers(self._name(topic)):
                 raise GraphError(
-                    f"somebody publishes {topic.name} in this ROS domain: "
+                    f"somebody publishes {self._name(topic)} in this ROS domain: "
                     "set ROS_DOMAIN_ID to one of your own"
                 )
 
@@ -181,7 +188,7 @@ class _Graph:
             moved = REPLAYED if topic in self._recording.topics else ""
             self._feeder.create_subscription(
                 message_class(topic.layout.type_name),
-                moved + topic.name,
+                moved + self._name(topic),
                 partial(self._take, topic),
                 quality(durable=True),
                 raw=True,
@@ -217,7 +224,7 @@ class _Graph:
             replayed = nominal and topic in LEARNER_TOPICS and topic in self.answers
             if topic not in self._recording.topics and not replayed:
                 raise BagError(
-                    f"{self._recording.path} holds no messages on {topic.name}, "
+                    f"{self._recording.path} holds no messages on {self._name(topic)}, "
                     f"without which {name} cannot be replayed"
                 )
 
@@ -230,7 +237,7 @@ class _Graph:
         """Publish the recording in the order of its stamps, at `rate` or as fast as possible."""
         publish = {
             topic: self._feeder.create_publisher(
-                message_class(topic.layout.type_name), topic.name, quality(durable=True)
+                message_class(topic.layout.type_name), self._name(topic), quality(durable=True)
             ).publish
             for topic in self._recording.topics
         }

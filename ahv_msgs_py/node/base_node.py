@@ -24,7 +24,7 @@ from ahv_msgs_py.node.real_time import reserve_memory
 from ahv_msgs_py.node.subscription import Listener, gids
 from ahv_msgs_py.node.synchronizer import Fallback, RealTimeSteps, Stepwise, Values
 from ahv_msgs_py.parameters import Parameter, Value
-from ahv_msgs_py.topics import DIAGNOSTICS, QUEUE_DEPTH, STATE, LoopTopic
+from ahv_msgs_py.topics import DIAGNOSTICS, QUEUE_DEPTH, STATE, LoopTopic, relative
 
 STATE_LOST_AFTER = 500_000_000  # [ns]
 
@@ -72,6 +72,10 @@ class BaseNode(ManagedNode):
 
     # Topics
 
+    def full_name(self, topic: LoopTopic) -> str:
+        """Name of a topic of the loop in the namespace of this node."""
+        return self.resolve_topic_name(relative(topic.name))
+
     def loop_quality(self) -> QoSProfile:
         """Quality of a receiver: a whole flight in lockstep, the newest in real time."""
         return newest() if self.realtime else quality(True)
@@ -86,7 +90,7 @@ class BaseNode(ManagedNode):
         """Open a publisher until the node is deactivated."""
         publisher = self.create_publisher(
             message_class(type_name),
-            name,
+            relative(name),
             qos,
             event_callbacks=PublisherEventCallbacks(matched=matched),
         )
@@ -103,12 +107,13 @@ class BaseNode(ManagedNode):
         encode = topic.layout.encode
         qos = quality(durable=not self.realtime, depth=self.sender_depth)
         publish = self.publisher(topic.layout.type_name, topic.name, qos, matched).publish
+        name = self.full_name(topic)
         low = min(low for low, _ in topic.bounds)
         high = max(high for _, high in topic.bounds)
 
         def send(stamp: int, values: Sequence[float]) -> None:
             if not (low <= min(values) and max(values) <= high and sum(values) - sum(values) == 0):
-                self.fault(stamp, Fault.OUTPUT_NOT_FINITE, f"{topic.name}: {list(values)}")
+                self.fault(stamp, Fault.OUTPUT_NOT_FINITE, f"{name}: {list(values)}")
                 return
             publish(encode(stamp, values))
 
@@ -117,7 +122,8 @@ class BaseNode(ManagedNode):
     def receive(self, topic: LoopTopic, handle: Callable[[int, Values], None]) -> None:
         """Subscribe to a loop topic; `handle(stamp, values)` gets every message that is obeyed."""
         message_type = message_class(topic.layout.type_name)
-        publishers = partial(gids, self, topic.name)
+        name = self.full_name(topic)
+        publishers = partial(gids, self, name)
         guard = Guard(
             topic, general_reader(topic.layout), time.monotonic_ns, self.realtime, publishers
         )
@@ -129,13 +135,13 @@ class BaseNode(ManagedNode):
             try:
                 stamp, values = judge(data, publisher, None if paces else self.now)
             except Refusal as refusal:
-                self.fault(self.now or 0, refusal.fault, f"{topic.name}: {refusal}")
+                self.fault(self.now or 0, refusal.fault, f"{name}: {refusal}")
                 return
             if paces:
                 self._state_came(stamp, guard)
             handle(stamp, values)
 
-        listener = Listener(self, message_type, topic.name, self.loop_quality(), read)
+        listener = Listener(self, message_type, relative(topic.name), self.loop_quality(), read)
         self._opened.append(listener.close)
 
     def _state_came(self, stamp: int, guard: Guard) -> None:
@@ -188,12 +194,12 @@ class BaseNode(ManagedNode):
         """
         topics = (STATE, *fallbacks)
         put = self.join(
-            [topic.name for topic in topics],
+            [self.full_name(topic) for topic in topics],
             answer,
-            {topic.name: fallback for topic, fallback in fallbacks.items()},
+            {self.full_name(topic): fallback for topic, fallback in fallbacks.items()},
         )
         for topic in topics:
-            self.receive(topic, partial(put, topic.name))
+            self.receive(topic, partial(put, self.full_name(topic)))
 
     def _missing(self, stamp: int, name: str) -> None:
         self.fault(stamp, Fault.INPUT_MISSING, name)

@@ -1,0 +1,116 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Two vehicles in one ROS domain, each in a namespace of its own, do not hear each other."""
+
+import json
+import multiprocessing
+
+import pytest
+from typer.testing import CliRunner
+
+from ahv_analysis.bag.reader import load_bag, read_bag
+from ahv_analysis.bag.writer import BagWriter
+from ahv_analysis.command.main import app
+from ahv_analysis.errors import BagError
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.library import fly
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_msgs_py.topics import (
+    ATTITUDE_COMMAND,
+    CLOCK,
+    RATE_COMMAND,
+    STATE,
+    SURFACE_COMMAND,
+    relative,
+    within,
+)
+
+CASES = {"/uav1": "nominal_di", "/fleet/uav2": "neuro_adaptive_di"}
+
+
+def ahv(*arguments):
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+DURATION = {"duration": 5.0}
+
+
+def fly_one(name, namespace, bag, both):
+    both.wait()
+    fly_graph(load_case(name, DURATION), bag, namespace=namespace)
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory):
+    """Bags of two vehicles that flew at once, by namespace."""
+    folder = tmp_path_factory.mktemp("fleet")
+    spawn = multiprocessing.get_context("spawn")
+    both = spawn.Barrier(len(CASES))
+    flights = {}
+    for number, (namespace, name) in enumerate(CASES.items()):
+        bag = folder / str(number)
+        process = spawn.Process(target=fly_one, args=(name, namespace, bag, both))
+        process.start()
+        flights[namespace] = (process, bag)
+    for process, _ in flights.values():
+        process.join(180)  # compiles first, where nobody has
+        assert process.exitcode == 0
+    return {namespace: bag for namespace, (_, bag) in flights.items()}
+
+
+@pytest.mark.parametrize("namespace", CASES)
+def test_each_flies_the_bits_of_its_flight_alone(bags, namespace):
+    alone = list(fly(load_case(CASES[namespace], DURATION)))
+    flown = read_bag(bags[namespace])
+    assert flown.steps == 500
+    assert flown.states.tolist() == [list(step.state) for step in alone]
+    assert flown.surfaces.tolist() == [list(step.commands.surfaces) for step in alone]
+    assert (flown.learner is None) == (namespace == "/uav1")
+
+
+@pytest.mark.parametrize("namespace", CASES)
+def test_each_has_its_topics_and_its_clock_in_its_bag(bags, namespace):
+    bag = load_bag(bags[namespace])
+    assert bag.namespace == namespace
+    assert bag.name(STATE) == f"{namespace}/state" in bag.topics
+    assert len(bag.topics[f"{namespace}/clock"].messages) == 501
+    assert not {name for name in bag.topics if name.startswith("/ahv/")}
+
+
+@pytest.mark.parametrize("namespace", CASES)
+def test_each_replays_without_a_difference(bags, namespace):
+    done = ahv("replay", bags[namespace], "--json")
+    result = json.loads(done.stdout)
+    assert (done.exit_code, result["differences"], result["missing"]) == (0, 0, 0)
+    assert result["compared"] == 501 * (4 if namespace == "/uav1" else 6)
+
+
+def test_reports_of_both_are_of_their_cases(bags, tmp_path):
+    assert ahv("report", *bags.values(), "--out", tmp_path).exit_code == 0
+    pages = [path.read_text() for path in sorted(tmp_path.glob("*.html"))]
+    assert len(pages) == 3 and all(any(name in page for page in pages) for name in CASES.values())
+
+
+def write_bag(path, topics, names):
+    bag = BagWriter(path, names=names)
+    for topic in topics:
+        bag.write(topic, bytes(40))
+    bag.close()
+    return path
+
+
+def test_a_bag_of_two_vehicles_names_them(tmp_path):
+    """As `ros2 bag record --all` makes one; here of the channels of one, renamed."""
+    neighbour = {ATTITUDE_COMMAND.name: "/uav1/state", RATE_COMMAND.name: "/uav1/surface_command"}
+    state = [STATE.name, SURFACE_COMMAND.name, ATTITUDE_COMMAND.name]
+    bag = write_bag(tmp_path / "one", state, neighbour)
+    assert load_bag(bag).namespace == "/ahv", "a neighbour that commands nothing is no vehicle"
+    bag = write_bag(tmp_path / "two", [*state, RATE_COMMAND.name], neighbour)
+    with pytest.raises(BagError, match=r"the flights of 2 vehicles, /ahv and /uav1: record each"):
+        load_bag(bag)
+
+
+def test_names_within_a_namespace():
+    assert (relative(STATE.name), relative(CLOCK.name)) == ("state", "/clock")
+    assert within("/uav1", STATE.name) == "/uav1/state"
+    assert within("/", STATE.name) == "/state"
+    assert within("/uav1", CLOCK.name) == "/clock"
