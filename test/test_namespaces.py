@@ -5,11 +5,9 @@ import json
 import multiprocessing
 
 import pytest
-from typer.testing import CliRunner
 
 from ahv_analysis.bag.reader import load_bag, read_bag
 from ahv_analysis.bag.writer import BagWriter
-from ahv_analysis.command.main import app
 from ahv_analysis.errors import BagError
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
@@ -23,12 +21,9 @@ from ahv_msgs_py.topics import (
     relative,
     within,
 )
+from test.test_replay import ahv  # noqa: F401  the command in this process
 
 CASES = {"/uav1": "nominal_di", "/fleet/uav2": "neuro_adaptive_di"}
-
-
-def ahv(*arguments):
-    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 DURATION = {"duration": 5.0}
@@ -77,14 +72,14 @@ def test_each_has_its_topics_and_its_clock_in_its_bag(bags, namespace):
 
 
 @pytest.mark.parametrize("namespace", CASES)
-def test_each_replays_without_a_difference(bags, namespace):
+def test_each_replays_without_a_difference(bags, namespace, ahv):  # noqa: F811
     done = ahv("replay", bags[namespace], "--json")
     result = json.loads(done.stdout)
     assert (done.exit_code, result["differences"], result["missing"]) == (0, 0, 0)
     assert result["compared"] == 501 * (4 if namespace == "/uav1" else 6)
 
 
-def test_reports_of_both_are_of_their_cases(bags, tmp_path):
+def test_reports_of_both_are_of_their_cases(bags, tmp_path, ahv):  # noqa: F811
     assert ahv("report", *bags.values(), "--out", tmp_path).exit_code == 0
     pages = [path.read_text() for path in sorted(tmp_path.glob("*.html"))]
     assert len(pages) == 3 and all(any(name in page for page in pages) for name in CASES.values())
