@@ -48,15 +48,10 @@ def end_on_signals() -> None:
             signal.signal(number, _end)
 
 
-@contextmanager
-def interrupted_says(words: Callable[[], str]) -> Iterator[None]:
-    """In here, an interrupted command says `words()`."""
+def interrupted_says(words: Callable[[], str]) -> None:
+    """From now on an interrupted command says `words()` too."""
     global _words
-    before, _words = _words, words
-    try:
-        yield
-    finally:
-        _words = before
+    _words = words
 
 
 def _end(number: int, frame: object) -> None:

@@ -21,6 +21,7 @@ from ahv_analysis.command.console import (
     progress_bar,
     show_table,
 )
+from ahv_analysis.interrupt import interrupted_says, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
 
@@ -92,7 +93,10 @@ def fly(
     for path in (bag, summary_file):
         if path.exists():
             raise UsageError(f"{path} exists already: choose another --out")
-    with progress_bar(f"flying {flight.name}", flight.plant.steps, as_json) as progress:
+    flown = Flown(bag)
+    interrupted_says(flown.words)
+    with progress_bar(f"flying {flight.name}", flight.plant.steps, as_json) as show:
+        progress = flown.passing(show)
         if engine == Engine.graph:
             check_domain()
             fly_ros = _engine(processes)
@@ -104,13 +108,37 @@ def fly(
     summary["dispersion"] = flight.plant.truth.dispersion._asdict()
     summary |= summarize(record, ended_early, flight.control)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
-    summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
+    with signals_wait():
+        summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
     if as_json:
         print_json(summary)
     else:
         _print_summary(summary)
     if ended_early:
         raise typer.Exit(1)
+
+
+class Flown:
+    """How far a flight has come, for who interrupts it."""
+
+    def __init__(self, bag: Path):
+        self._bag = bag
+        self._step = -1
+
+    def passing(self, progress: Callable[[int], None]) -> Callable[[int], None]:
+        """Return `progress`, overheard."""
+
+        def overheard(step: int) -> None:
+            self._step = step
+            progress(step)
+
+        return overheard
+
+    def words(self) -> str:
+        """What became of the flight."""
+        if self._step < 0:
+            return "before the flight began"
+        return f"at {self._step * STEP:.2f} s; what was flown is in {self._bag}"
 
 
 def _engine(processes: bool) -> Callable[..., tuple[str, float]]:

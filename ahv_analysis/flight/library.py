@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
+from ahv_analysis.interrupt import signals_wait
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.flight_control import (
     NEUTRAL,
@@ -36,6 +37,7 @@ from ahv_plant.termination import termination_reason
 from ahv_plant.vehicle import vehicle_step
 
 CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
+INTERRUPTED = "interrupted"  # why a flight ended early, where a signal does not end the program
 
 
 class Step(NamedTuple):
@@ -78,20 +80,25 @@ def fly_library(
     """Fly `case` and record it to the bag `path`, as `fly_graph` does.
 
     `progress(steps)` is called now and then. Returns why the flight ended early (empty if it did
-    not) and the seconds that it took.
+    not) and the seconds that it took. A signal ends the flight in order, as there.
     """
-    bag = BagWriter(path, notes(case))
-    started = time.perf_counter()
-    try:
-        for step in fly(case):
-            write_step(bag, step)
-            if (step.stamp + STEP_NS) % CHUNK == 0:
-                bag.flush()
-                progress(step.stamp // STEP_NS)
-    finally:
-        bag.close()  # whole up to here, even if the flight is interrupted
-    wall = time.perf_counter() - started
-    return step.ended_early, wall
+    for _ in zip(range(2), fly(case), strict=False):
+        pass  # compile the laws before there is a bag
+    with signals_wait() as interrupted:
+        bag = BagWriter(path, notes(case))
+        started = time.perf_counter()
+        try:
+            for step in fly(case):
+                write_step(bag, step)
+                if (step.stamp + STEP_NS) % CHUNK == 0:
+                    bag.flush()
+                    progress(step.stamp // STEP_NS)
+                if interrupted():
+                    progress(step.stamp // STEP_NS)
+                    return INTERRUPTED, time.perf_counter() - started
+        finally:
+            bag.close()
+        return step.ended_early, time.perf_counter() - started
 
 
 def write_step(bag: BagWriter, step: Step) -> None:

@@ -1,6 +1,8 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """What the server that node processes are forked off loads once: the nodes and their laws."""
 
+import os
+
 from ahv_analysis.flight.case import load_case
 from ahv_control.disturbance_learner import disturbance_estimate
 from ahv_control.flight_control import NEUTRAL, first_learner, next_learner
@@ -31,3 +33,4 @@ def compile_laws() -> None:
 
 
 compile_laws()
+os.setpgrp()  # a terminal's signals are for the one who watches the flight, and ends it in order

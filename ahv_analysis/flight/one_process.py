@@ -12,7 +12,8 @@ from rclpy.task import Future
 from ahv_analysis.bag.recorder_node import STOP, RecorderNode
 from ahv_analysis.errors import GraphError
 from ahv_analysis.flight.case import Case, notes
-from ahv_analysis.flight.library import fly
+from ahv_analysis.flight.library import INTERRUPTED, fly
+from ahv_analysis.interrupt import signals_wait
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.namespace import ros_arguments
 from ahv_msgs_py.node.base_node import BaseNode
@@ -47,8 +48,27 @@ def fly_graph(
     and then. Returns why the flight ended early (empty if it did not) and the seconds from the
     first state to the last command. Raises ParameterError for settings that a node refuses,
     GraphError if the graph stops and BagError if the disk fails; with `on_error` CONTINUE the
-    flight goes on without a record then.
+    flight goes on without a record then. A signal ends the flight in order: it has its effect once
+    the bag is whole and the graph is gone.
     """
+    for _ in zip(range(2), fly(case), strict=False):
+        pass  # compile the laws before the clock runs
+    with signals_wait() as interrupted:
+        return _fly_graph(
+            case, bag, domain, namespace, realtime, on_error, progress, interrupted
+        )
+
+
+def _fly_graph(
+    case: Case,
+    bag: Path | None,
+    domain: int | None,
+    namespace: str,
+    realtime: bool,
+    on_error: str,
+    progress: Callable[[int], None],
+    interrupted: Callable[[], bool],
+) -> tuple[str, float]:
     keep_to_this_machine()
     context = rclpy.Context()
     rclpy.init(args=ros_arguments(namespace), context=context, domain_id=domain)
@@ -68,14 +88,14 @@ def fly_graph(
         listeners = len(nodes)
         plant = PlantNode(case.parameters["plant"] | mode | {"listeners": listeners}, context)
         nodes.append(plant)
-        for _ in zip(range(2), fly(case), strict=False):
-            pass  # compile the laws before the clock runs
         for node in nodes:
             node.bring_up()
             executor.add_node(node)
         started = time.perf_counter()
-        _spin(executor, plant, recorder, progress)
+        _spin(executor, plant, recorder, progress, interrupted)
         wall = time.perf_counter() - started
+        if interrupted():
+            return INTERRUPTED, wall
         if plant.count_publishers(plant.full_name(STATE)) > 1:
             raise GraphError(
                 f"another plant flew in the namespace {namespace} of this ROS domain: "
@@ -86,6 +106,7 @@ def fly_graph(
     finally:
         for node in nodes:
             executor.remove_node(node)
+            node.conclude()
         executor.shutdown()
         for node in reversed(nodes):
             node.destroy_node()
@@ -100,8 +121,9 @@ def _spin(
     plant: PlantNode,
     recorder: RecorderNode | None,
     progress: Callable[[int], None],
+    interrupted: Callable[[], bool],
 ) -> None:
-    """Run the graph until the flight is over, or until the recorder gives it up.
+    """Run the graph until the flight is over or interrupted, or until the recorder gives it up.
 
     The executor looks at the time only when nothing waits for it: in lockstep hardly ever. So
     progress comes by a timer, and the end by a future.
@@ -110,7 +132,13 @@ def _spin(
     for node in (plant, recorder):
         if node is not None:
             node.finished.add_done_callback(lambda _: over.done() or over.set_result(None))
-    plant.create_timer(LOOK, lambda: progress(plant.step))
+
+    def look() -> None:
+        progress(plant.step)
+        if interrupted() and not over.done():
+            over.set_result(None)
+
+    plant.create_timer(LOOK, look)
     last, since = -1, time.monotonic()
     while not over.done():
         executor.spin_until_future_complete(over, LOOK)

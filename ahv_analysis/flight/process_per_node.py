@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -18,6 +19,8 @@ import rclpy
 from ahv_analysis.errors import GraphError
 from ahv_analysis.faults.faulty_node import faulty
 from ahv_analysis.flight.case import Case, notes
+from ahv_analysis.flight.library import INTERRUPTED
+from ahv_analysis.interrupt import SIGNALS, signals_wait
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.managed_node import REALTIME
@@ -131,8 +134,25 @@ class ProcessGraph:
         self._context = multiprocessing.get_context("forkserver")
         self.report = FlightReport(self._context)
         self._context.set_forkserver_preload(
-            [node.module for node in NODES.values()] + ["ahv_analysis.flight.node_server"]
+            [
+                "ahv_analysis.flight.node_server_signals",
+                *(node.module for node in NODES.values()),
+                "ahv_analysis.flight.node_server",
+            ]
         )
+        self._start_server()
+
+    def _start_server(self) -> None:
+        """Start what processes are forked off, and wait until it has loaded everything."""
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # until it is ready for one
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        first = self._context.Process(target=int)
+        first.start()
+        first.join()
 
     def __enter__(self) -> "ProcessGraph":
         for name in self.values:
@@ -210,14 +230,19 @@ def fly_processes(
 
     In real time a controller that ends is started again at once. Returns why the flight ended
     early (empty if it did not) and the seconds that it took. Raises GraphError if the graph stops.
+    A signal ends the flight in order, as there.
     """
     keep_to_this_machine(shared_memory=not realtime)
-    with ProcessGraph(case, bag, realtime) as graph:
-        return _watch(graph, realtime, progress)
+    graph = ProcessGraph(case, bag, realtime)
+    with signals_wait() as interrupted, graph:
+        return _watch(graph, realtime, progress, interrupted)
 
 
 def _watch(
-    graph: ProcessGraph, realtime: bool, progress: Callable[[int], None]
+    graph: ProcessGraph,
+    realtime: bool,
+    progress: Callable[[int], None],
+    interrupted: Callable[[], bool],
 ) -> tuple[str, float]:
     """Look on until the plant says that the flight is over: why, and the seconds that it took."""
     last, since, started = -1, time.monotonic() + LONGEST_START, 0.0
@@ -228,6 +253,9 @@ def _watch(
         progress(step)
         if reason is not None:
             return reason, now - started
+        if interrupted():
+            graph.end_flight()
+            return INTERRUPTED, now - started
         if step != last:
             started = started or now
             last, since = step, now

@@ -1,0 +1,145 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Ctrl-C at random moments in a terminal: `python -m test.interrupt MOMENTS SEED`.
+
+What a command leaves behind is whole, it says one sentence, and ends with 128 and the signal.
+"""
+
+import errno
+import os
+import pty
+import random
+import re
+import select
+import signal
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+AHV = str(Path(sys.executable).parent / "ahv")
+LONGEST_END = 10.0  # [s] from the signal on
+ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+NUMBERS = {"INT": signal.SIGINT, "TERM": signal.SIGTERM, "HUP": signal.SIGHUP}
+
+
+class End(NamedTuple):
+    """How an interrupted command ended."""
+
+    code: int  # exit code; negative: the signal that killed it
+    said: str  # what is left on the terminal
+    took: float  # [s] from the signal on
+
+
+def interrupted(command, cwd, after, how="INT", environment=None):
+    """Run a command on a terminal of its own and interrupt it; None if it ended before that.
+
+    `how` is a signal, "INT" by way of the key Ctrl-C.
+    """
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.chdir(cwd)
+        for number in NUMBERS.values():
+            signal.signal(number, signal.SIG_DFL)
+        os.execve(command[0], command, os.environ | (environment or {}))
+    said = bytearray()
+    _listen(terminal, said, after)
+    if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+        sent = None
+    else:
+        sent = time.monotonic()
+        if how == "INT":
+            os.write(terminal, b"\x03")
+        else:
+            os.kill(pid, NUMBERS[how])
+    _listen(terminal, said, LONGEST_END + 5.0)
+    ended = time.monotonic()
+    os.close(terminal)
+    _, status = os.waitpid(pid, 0)
+    if sent is None:
+        return None
+    text = ESCAPES.sub("", said.decode(errors="replace")).replace("\r\n", "\n")
+    return End(os.waitstatus_to_exitcode(status), text, ended - sent)
+
+
+def _listen(terminal, said, seconds):
+    """Read a terminal for so long, or until nobody has it open any more."""
+    until = time.monotonic() + seconds
+    while (left := until - time.monotonic()) > 0:
+        if not select.select([terminal], [], [], left)[0]:
+            return
+        try:
+            data = os.read(terminal, 65536)
+        except OSError as error:
+            if error.errno != errno.EIO:
+                raise
+            return
+        if not data:
+            return
+        said += data
+
+
+def fault(end, how, bag):
+    """What is wrong with an end, empty if nothing is."""
+    from ahv_analysis.bag.reader import read_bag
+
+    sentences = [line for line in end.said.splitlines() if "ahv: interrupted" in line]
+    if end.code != 128 + NUMBERS[how]:
+        return f"exit code {end.code}"
+    if len(sentences) != 1 or "Traceback" in end.said or "ERROR" in end.said:
+        return "not one sentence"
+    if end.took > LONGEST_END:
+        return f"{end.took:.1f} s"
+    if bag.exists():
+        if not (bag / "metadata.yaml").exists():
+            return "the bag is not whole"
+        if "before the flight began" not in sentences[0]:
+            flown = float(re.search(r"at ([0-9.]+) s; what was flown is in ", sentences[0])[1])
+            steps = read_bag(bag).steps
+            if not -30 <= steps - flown * 100 <= 30:  # of which the last are under way
+                return f"{steps} steps, but it says {flown} s"
+    return ""
+
+
+def try_moments(command, longest, moments, seed):
+    """Interrupt a flight at random moments of `longest` [s]; prints and returns what went wrong."""
+    draw = random.Random(seed)
+    wrong = []
+    for number in range(moments):
+        how = draw.choice(["INT", "INT", "TERM", "HUP"])
+        after = draw.uniform(0.0, longest)
+        with TemporaryDirectory() as folder:
+            end = interrupted([AHV, *command, "--out", "out"], folder, after, how)
+            if end is None:
+                print(f"{number} {how} at {after:.2f} s: had ended before")
+                continue
+            reason = fault(end, how, Path(folder) / "out" / "bag")
+        last = end.said.strip().splitlines()[-1:] or [""]
+        print(f"{number} {how} at {after:.2f} s: {end.code} in {end.took:.2f} s {last[0]} {reason}")
+        sys.stdout.flush()
+        if reason:
+            wrong.append((how, after, reason, end))
+    return wrong
+
+
+def main():
+    """Try all ways to fly, and say what went wrong."""
+    moments, seed = int(sys.argv[1]), int(sys.argv[2])
+    wrong = []
+    for ways, longest in (
+        ((), 6.0),
+        (("--realtime",), 6.0),
+        (("--processes",), 8.0),
+        (("--engine", "library"), 6.0),
+    ):
+        print(f"ahv fly {' '.join(ways)}")
+        command = ("fly", "neuro_adaptive_di", *ways)
+        wrong += try_moments(command, longest, moments, seed)
+    for how, after, reason, end in wrong:
+        print(f"\n{how} at {after:.2f} s: {reason}\n{end.said[-3000:]}")
+    print(f"{len(wrong)} ends were wrong")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
