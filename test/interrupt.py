@@ -102,7 +102,7 @@ def fault(end, how, bag):
 
 
 def try_moments(command, longest, moments, seed):
-    """Interrupt a flight at random moments of `longest` [s]; prints and returns what went wrong."""
+    """Interrupt a flight at random moments of `longest` [s]; return what went wrong."""
     draw = random.Random(seed)
     wrong = []
     for number in range(moments):
@@ -115,7 +115,9 @@ def try_moments(command, longest, moments, seed):
                 continue
             reason = fault(end, how, Path(folder) / "out" / "bag")
         last = end.said.strip().splitlines()[-1:] or [""]
-        print(f"{number} {how} at {after:.2f} s: {end.code} in {end.took:.2f} s {last[0]} {reason}")
+        print(
+            f"{number} {how} at {after:.2f} s: {end.code} in {end.took:.2f} s {last[0]} {reason}"
+        )
         sys.stdout.flush()
         if reason:
             wrong.append((how, after, reason, end))

@@ -33,6 +33,7 @@ from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import source_hash
 
 RUNS_PER_JOB = 64  # four batches: half a second of work, so that little is lost and little waits
+LOOK = 0.2  # [s] between looks for an interruption
 JOBS_UNDER_WAY = 64  # handed to the executor at a time, so that a campaign of any size can wait
 # Random starts of section 3.5.2, around the case's own: plus and minus, in the plant's parameters.
 START_SPREAD = {
@@ -140,13 +141,15 @@ def fly_campaign(
     folder: Path,
     executor: Executor,
     progress: Callable[[int], None] = lambda runs: None,
+    interrupted: Callable[[], bool] = lambda: False,
 ) -> None:
     """Fly what `folder` does not hold yet of `campaign`, and keep it there.
 
     Jobs go to `executor`, whatever it is; a job that fails is an error, one whose worker died is
-    the executor's to repeat. A part is written when all of it is flown. Interrupted, by
-    KeyboardInterrupt or an error, the folder keeps what was flown. `progress(runs)` is called now
-    and then. Raises CampaignError if the folder holds another campaign or cannot hold any.
+    the executor's to repeat. A part is written when all of it is flown. Once
+    `interrupted()`, or by an error, it ends and the folder keeps what was flown. `progress(runs)`
+    is called now and then. Raises CampaignError if the folder holds another campaign or cannot
+    hold any.
     """
     kept = level_folder(folder, campaign.level)
     try:
@@ -162,12 +165,12 @@ def fly_campaign(
     jobs = _jobs(campaign, kept, parts)
     under_way: dict[Future[Columns], int] = {}
     try:
-        while True:
+        while not interrupted():
             for start, first, runs in islice(jobs, JOBS_UNDER_WAY - len(under_way)):
                 under_way[executor.submit(fly_runs, campaign, first, runs)] = start
             if not under_way:
                 break
-            finished, _ = wait(under_way, return_when=FIRST_COMPLETED)
+            finished, _ = wait(under_way, LOOK, FIRST_COMPLETED)
             for future in finished:
                 start = under_way.pop(future)
                 part = parts[start]

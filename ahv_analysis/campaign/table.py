@@ -38,10 +38,19 @@ class Row(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Where our rate lies against the report's 95 % interval."""
-        low, high = self.reported_interval
-        rate = self.flown["success_rate"]
-        return "below" if rate < low else "above" if rate > high else "within"
+        """How our rate compares with the report's: apart if neither lies in the other's interval.
+
+        A few trials, whose interval is wide, are never apart from the report.
+        """
+        (low, high), (least, most) = self.reported_interval, self.flown["interval"]
+        rate, reported = self.flown["success_rate"], self.reported / self.trials
+        return (
+            "below"
+            if rate < low and most < reported
+            else "above"
+            if rate > high and least > reported
+            else "within"
+        )
 
 
 def fly_table(
@@ -51,8 +60,12 @@ def fly_table(
     runs: int | None,
     protected: bool,
     progress: Callable[[int], None],
+    interrupted: Callable[[], bool] = lambda: False,
 ) -> list[Row]:
-    """Fly every cell of the table; `runs` replaces the report's numbers of trials."""
+    """Fly every cell of the table; `runs` replaces the report's numbers of trials.
+
+    Once `interrupted()` it ends, and the folder keeps what was flown.
+    """
     rows = []
     before = 0
     for controller in CONTROLLERS:
@@ -64,7 +77,10 @@ def fly_table(
                 folder / case.name,
                 executor,
                 lambda done, before=before: progress(before + done),
+                interrupted,
             )
+            if interrupted():
+                return rows
             before += campaign.runs
             successes = reported.successes[controller]
             rows.append(

@@ -13,6 +13,7 @@ from ahv_analysis.command.console import (
     show_table,
 )
 from ahv_analysis.errors import BagError
+from ahv_analysis.interrupt import signals_wait
 
 bag = typer.Typer(
     help="Look into the bag of a flight, recover it, export it.",
@@ -86,7 +87,8 @@ def recover(
     from ahv_analysis.bag.recovery import recover as write_recovered
 
     target = out or path.with_name(f"{path.name}-recovered")
-    recovery = write_recovered(path, target)
+    with signals_wait():
+        recovery = write_recovered(path, target)
     facts: dict[str, Any] = {"source": str(path), "recovered": None}
     if recovery is not None:
         flight = _flight(target)
@@ -157,7 +159,8 @@ def export(
     for kind, file in files.items():
         content = EXPORTS[kind](flight)
         try:
-            _write_new(file, content)
+            with signals_wait():
+                _write_new(file, content)
         except OSError as error:
             raise UsageError(f"cannot write {file}: {error.strerror}") from error
     if as_json:

@@ -3,11 +3,11 @@
 
 import json
 import os
-import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +15,7 @@ import typer
 
 from ahv_analysis.command.console import (
     Json,
+    Reported,
     UsageError,
     check_domain,
     integer_option,
@@ -22,6 +23,7 @@ from ahv_analysis.command.console import (
     progress_bar,
     show_table,
 )
+from ahv_analysis.interrupt import interrupted_says, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
 
@@ -104,11 +106,9 @@ def fly(
             with progress_bar(f"{case.name} at {one:g}", runs, as_json, unit="runs") as progress:
                 reported = Reported(progress)
                 started = time.perf_counter()
-                try:
-                    fly_campaign(campaign, folder, pool, reported)
-                except KeyboardInterrupt:
-                    print_interrupted(reported.last, runs)
-                    raise typer.Exit(130) from None
+                interrupted_says(partial(_kept, reported, runs))
+                with signals_wait() as interrupted:
+                    fly_campaign(campaign, folder, pool, reported, interrupted)
                 wall = time.perf_counter() - started
             summary = summarize_campaign(campaign, folder)
             steps = summary["flown_s"] / STEP * (1 - (reported.first or 0) / runs)
@@ -121,26 +121,9 @@ def fly(
         _show(summary)
 
 
-class Reported:
-    """Passes progress on, and knows the first and the last of it."""
-
-    def __init__(self, progress: Callable[[int], None]):
-        self._progress = progress
-        self.first: int | None = None
-        self.last = 0
-
-    def __call__(self, done: int) -> None:
-        """Take the number of runs done so far."""
-        self.first = done if self.first is None else self.first
-        self.last = done
-        self._progress(done)
-
-
-def print_interrupted(done: int, runs: int) -> None:
-    """Say what an interrupted campaign keeps."""
-    print(
-        f"ahv: interrupted after {done} of {runs} runs; the same command resumes", file=sys.stderr
-    )
+def _kept(reported: Reported, runs: int) -> str:
+    """What an interrupted campaign keeps."""
+    return f"after {max(reported.last, 0)} of {runs} runs; the same command resumes"
 
 
 def _show(summary: dict[str, Any]) -> None:
@@ -247,14 +230,13 @@ def table(
         executor_of(workers, dask) as pool,
         progress_bar("Table 5.1", total, as_json, unit="runs") as progress,
     ):
-        try:
-            rows = fly_table(out, pool, seed, runs, protected, progress)
-        except KeyboardInterrupt:
-            print("ahv: interrupted; the same command resumes", file=sys.stderr)
-            raise typer.Exit(130) from None
+        reported = Reported(progress)
+        interrupted_says(partial(_kept, reported, total))
+        with signals_wait() as interrupted:
+            rows = fly_table(out, pool, seed, runs, protected, reported, interrupted)
     name = "table_protected" if protected else "table"
     text = markdown(rows)
-    (out / f"{name}.md").write_text(text)
+    (out / f"{name}.md").write_text(text, encoding="utf-8")
     content = {
         "wall_s": time.perf_counter() - started,
         "rows": [row.flown | {"against_report": row.verdict} for row in rows],

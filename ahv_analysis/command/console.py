@@ -94,6 +94,21 @@ class _RateColumn(ProgressColumn):
         return Text(f"{task.speed:.0f} {self._unit}/s" if task.speed else "")
 
 
+class Reported:
+    """Passes progress on, and knows the first and the last of it."""
+
+    def __init__(self, progress: Callable[[int], None]):
+        self._progress = progress
+        self.first: int | None = None
+        self.last = -1
+
+    def __call__(self, done: int) -> None:
+        """Take the work done so far."""
+        self.first = done if self.first is None else self.first
+        self.last = done
+        self._progress(done)
+
+
 @contextmanager
 def progress_bar(
     title: str, total: int, hidden: bool, unit: str = "steps"

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from ahv_analysis.command.console import (
     Json,
+    Reported,
     UsageError,
     check_domain,
     console,
@@ -17,6 +18,7 @@ from ahv_analysis.command.console import (
     print_json,
     progress_bar,
 )
+from ahv_analysis.interrupt import interrupted_says
 from ahv_msgs_py.node.faults import fault_rows
 
 COLUMNS = ("fault", "noticed by", "detection", "response", "latency")
@@ -65,7 +67,11 @@ def run(
     if folder.exists():
         raise UsageError(f"{folder} exists already: choose another --out")
     with progress_bar("injecting", injections, as_json, unit="faults") as progress:
-        report = run_campaign(injections, seed, folder, progress)
+        reported = Reported(progress)
+        interrupted_says(
+            lambda: f"after {max(reported.last, 0)} of {injections} faults; bags are in {folder}"
+        )
+        report = run_campaign(injections, seed, folder, reported)
     if as_json:
         print_json(report)
     else:

@@ -5,6 +5,7 @@ import json
 import time
 from collections.abc import Callable
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,7 @@ from typer.core import TyperCommand
 
 from ahv_analysis.command.console import (
     Json,
+    Reported,
     UsageError,
     check_domain,
     integer_option,
@@ -93,10 +95,9 @@ def fly(
     for path in (bag, summary_file):
         if path.exists():
             raise UsageError(f"{path} exists already: choose another --out")
-    flown = Flown(bag)
-    interrupted_says(flown.words)
     with progress_bar(f"flying {flight.name}", flight.plant.steps, as_json) as show:
-        progress = flown.passing(show)
+        progress = Reported(show)
+        interrupted_says(partial(_what_is_left, progress, bag))
         if engine == Engine.graph:
             check_domain()
             fly_ros = _engine(processes)
@@ -118,27 +119,11 @@ def fly(
         raise typer.Exit(1)
 
 
-class Flown:
-    """How far a flight has come, for who interrupts it."""
-
-    def __init__(self, bag: Path):
-        self._bag = bag
-        self._step = -1
-
-    def passing(self, progress: Callable[[int], None]) -> Callable[[int], None]:
-        """Return `progress`, overheard."""
-
-        def overheard(step: int) -> None:
-            self._step = step
-            progress(step)
-
-        return overheard
-
-    def words(self) -> str:
-        """What became of the flight."""
-        if self._step < 0:
-            return "before the flight began"
-        return f"at {self._step * STEP:.2f} s; what was flown is in {self._bag}"
+def _what_is_left(reported: Reported, bag: Path) -> str:
+    """What an interrupted flight leaves."""
+    if reported.last < 0:
+        return "before the flight began"
+    return f"at {reported.last * STEP:.2f} s; what was flown is in {bag}"
 
 
 def _engine(processes: bool) -> Callable[..., tuple[str, float]]:

@@ -6,6 +6,7 @@ import math
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
@@ -22,6 +23,7 @@ from ahv_analysis.flight.process_per_node import (
     ProcessGraph,
 )
 from ahv_analysis.flight.watcher import Watcher
+from ahv_analysis.interrupt import signals_wait
 from ahv_msgs_py.graph import controllers, listeners
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
@@ -106,9 +108,9 @@ def draw_injections(random: Random, count: int) -> Iterator[tuple[str, str, floa
 class Spectator(Watcher):
     """Sees the states, and can speak where it should not."""
 
-    def __init__(self) -> None:
+    def __init__(self, interrupted: Callable[[], bool] = lambda: False):
         """Listen to the state as well."""
-        super().__init__()
+        super().__init__(interrupted)
         message_type = message_class(STATE.layout.type_name)
         self._node.create_subscription(
             message_type, STATE.name, self._see, quality(durable=False, depth=10), raw=True
@@ -174,6 +176,24 @@ def run_campaign(
     return report
 
 
+@contextmanager
+def _watched_flight(bag: Path, can_fail: bool) -> Iterator[tuple[Spectator, ProcessGraph]]:
+    """Fly while somebody looks on; a signal ends it in order, and the looks at once."""
+    keep_to_this_machine()
+    case = load_case(CASE, {"duration": 3600.0})
+    graph = ProcessGraph(case, bag, realtime=True, spectators=1, can_fail=can_fail)
+    with signals_wait() as interrupted:
+        spectator = Spectator(interrupted)
+        try:
+            with graph:
+                _wait_for_flight(spectator)
+                spectator.look(LEAD)
+                yield spectator, graph
+                graph.end_flight()
+        finally:
+            spectator.close()
+
+
 def _disturbed_flight(
     plan: list[tuple[str, str, float]],
     bag: Path,
@@ -181,60 +201,40 @@ def _disturbed_flight(
     progress: Callable[[], None],
 ) -> dict[str, Any]:
     """One flight with the injections of a plan."""
-    keep_to_this_machine()
-    spectator = Spectator()
     unexpected: list[str] = []
-    try:
-        case = load_case(CASE, {"duration": 3600.0})
-        with ProcessGraph(case, bag, realtime=True, spectators=1, can_fail=True) as graph:
-            _wait_for_flight(spectator)
-            spectator.look(LEAD)
-            for kind, target, length in plan:
-                done.append(_inject(spectator, graph, kind, target, length))
-                unexpected += [f"{name}: {code}" for name, code in graph.ended().items()]
-                progress()
-            graph.end_flight()
-    finally:
-        spectator.close()
+    with _watched_flight(bag, can_fail=True) as (spectator, graph):
+        for kind, target, length in plan:
+            done.append(_inject(spectator, graph, kind, target, length))
+            unexpected += [f"{name}: {code}" for name, code in graph.ended().items()]
+            progress()
     return {"steps": spectator.stamp // STEP_NS, "unexpected_ends": unexpected}
 
 
 def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
     """One flight that loses its recorder, and then its plant, and gets a new one."""
-    keep_to_this_machine()
-    spectator = Spectator()
-    try:
-        case = load_case(CASE, {"duration": 3600.0})
-        with ProcessGraph(case, bag, realtime=True, spectators=1) as graph:
-            _wait_for_flight(spectator)
-            spectator.look(LEAD)
-            killed = spectator.stamp
-            graph.kill("recorder")
-            spectator.look(SETTLE)
-            went_on = spectator.stamp - killed
-            alpha = spectator.max_abs_alpha * DEGREES
-            goes_on = "the flight goes on" if went_on > 0.5 * SETTLE * 1e9 else ""
-            done.append(
-                Injection("recorder killed", "recorder", killed * 1e-9, 0.0, goes_on, 0.0, alpha)
-            )
+    with _watched_flight(bag, can_fail=False) as (spectator, graph):
+        killed = spectator.stamp
+        graph.kill("recorder")
+        spectator.look(SETTLE)
+        went_on = spectator.stamp - killed
+        alpha = spectator.max_abs_alpha * DEGREES
+        goes_on = "the flight goes on" if went_on > 0.5 * SETTLE * 1e9 else ""
+        done.append(
+            Injection("recorder killed", "recorder", killed * 1e-9, 0.0, goes_on, 0.0, alpha)
+        )
 
-            start, seen = spectator.stamp, len(spectator.statuses)
-            spectator.max_abs_alpha = 0.0
-            graph.kill("plant")
-            spectator.look(2.0)
-            lost = {
-                node for _, node, _, text, _ in spectator.statuses[seen:] if "state lost" in text
-            }
-            graph.values["plant"] |= {"listeners": len(graph.controllers) + 1}  # no recorder
-            graph.start("plant")
-            spectator.look(5.0)
-            restarted = 1e9 < spectator.stamp != start and spectator.max_abs_alpha > 0.0
-            noticed = "all controllers: state lost" if lost >= {*CONTROLLERS} and restarted else ""
-            alpha = spectator.max_abs_alpha * DEGREES
-            done.append(Injection("plant killed", "plant", start * 1e-9, 2.0, noticed, 1.5, alpha))
-            graph.end_flight()
-    finally:
-        spectator.close()
+        start, seen = spectator.stamp, len(spectator.statuses)
+        spectator.max_abs_alpha = 0.0
+        graph.kill("plant")
+        spectator.look(2.0)
+        lost = {node for _, node, _, text, _ in spectator.statuses[seen:] if "state lost" in text}
+        graph.values["plant"] |= {"listeners": len(graph.controllers) + 1}  # no recorder
+        graph.start("plant")
+        spectator.look(5.0)
+        restarted = 1e9 < spectator.stamp != start and spectator.max_abs_alpha > 0.0
+        noticed = "all controllers: state lost" if lost >= {*CONTROLLERS} and restarted else ""
+        alpha = spectator.max_abs_alpha * DEGREES
+        done.append(Injection("plant killed", "plant", start * 1e-9, 2.0, noticed, 1.5, alpha))
     recovered = bag.with_name(bag.name + "-recovered")
     recover(bag, recovered)
     stamps = [

@@ -2,6 +2,7 @@
 """Somebody outside the graph who listens to its diagnostics."""
 
 import time
+from collections.abc import Callable
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -12,12 +13,15 @@ from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
 from ahv_plant.model.constants import STEP_NS
 
+LOOK = 0.2  # [s] between looks for an interruption
+
 
 class Watcher:
     """Listens to the diagnostics of the graph from outside it."""
 
-    def __init__(self) -> None:
-        """Start to listen; no flight has been seen yet."""
+    def __init__(self, interrupted: Callable[[], bool] = lambda: False):
+        """Start to listen; once `interrupted()` there is no more looking."""
+        self._interrupted = interrupted
         self.context = rclpy.Context()
         rclpy.init(context=self.context)
         self._node = rclpy.create_node("watcher", namespace=NAMESPACE, context=self.context)
@@ -48,8 +52,8 @@ class Watcher:
     def look(self, seconds: float) -> None:
         """Listen for so long."""
         until = time.monotonic() + seconds
-        while (left := until - time.monotonic()) > 0:
-            self._executor.spin_once(left)
+        while (left := until - time.monotonic()) > 0 and not self._interrupted():
+            self._executor.spin_once(min(left, LOOK))
 
     def close(self) -> None:
         """Stop listening."""

@@ -28,6 +28,8 @@ from rclpy.task import Future
 
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import Case
+from ahv_analysis.flight.library import fly
+from ahv_analysis.interrupt import signals_wait
 from ahv_analysis.replay.inputs import LEARNER_NODE, Change, Recording
 from ahv_analysis.replay.result import Comparison, compare
 from ahv_msgs_py.graph import NODES
@@ -85,16 +87,23 @@ def replay(
 
     As fast as the nodes answer, on a graph that nobody else hears; or `rate` times real time, to
     be watched, in a ROS domain where nobody flies. `progress(steps)` is called now and then.
+    A signal has its effect once the graph is gone.
     Raises ParameterError for settings that a node refuses, BagError if the bag lacks a topic that
     a node needs, GraphError if a node stops answering or somebody flies here.
     """
-    with _context(_remapping(recording, names), domain, hidden=rate is None) as context:
+    for _ in zip(range(2), fly(case), strict=False):
+        pass  # compile the laws before anything must be left in order
+    hidden = rate is None
+    with (
+        signals_wait() as interrupted,
+        _context(_remapping(recording, names), domain, hidden) as context,
+    ):
         graph = _Graph(recording, case, names, context)
         try:
             if rate is not None:
                 graph.refuse_company()
             graph.bring_up()
-            graph.feed(rate, progress)
+            graph.feed(rate, progress, interrupted)
         finally:
             graph.close()
     comparisons = [
@@ -233,7 +242,12 @@ class _Graph:
         recorded = self._recording.topics.get(topic)
         return set(recorded if recorded is not None else self.complete[LEARNER_NODE])
 
-    def feed(self, rate: float | None, progress: Callable[[int], None]) -> None:
+    def feed(
+        self,
+        rate: float | None,
+        progress: Callable[[int], None],
+        interrupted: Callable[[], bool],
+    ) -> None:
         """Publish the recording in the order of its stamps, at `rate` or as fast as possible."""
         publish = {
             topic: self._feeder.create_publisher(
@@ -246,11 +260,14 @@ class _Graph:
         for number, stamp in enumerate(self.steps):
             if rate is not None:
                 due = started + (stamp - self.steps[0]) / NANOSECONDS / rate
-                self._spin(due - time.monotonic())
+                while (left := due - time.monotonic()) > 0.0 and not interrupted():
+                    self._spin(min(left, LOOK))
             changed = changes and changes[0].stamp <= stamp
             if changed or number % BATCH == 0:
                 self._await_answers(stamp)
                 progress(number)
+            if interrupted():
+                return
             while changes and changes[0].stamp <= stamp:
                 self._change(changes.pop(0))
             for topic, messages in self._recording.topics.items():
