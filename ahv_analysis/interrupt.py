@@ -56,8 +56,10 @@ def interrupted_says(words: Callable[[], str]) -> None:
 
 def _end(number: int, frame: object) -> None:
     said = " ".join(("ahv: interrupted", *filter(None, [_words()])))
-    # not through sys.stderr, which may be in the middle of a line; without the ways of an exit,
-    # which wait for threads
-    clear = CLEAR_LINE_AND_SHOW_CURSOR if os.isatty(2) else b""
-    os.write(2, clear + said.encode(errors="backslashreplace") + b"\n")
+    # not through sys.stderr, which may be in the middle of a line, nor before a thread that draws
+    # there; and without the ways of an exit, which wait for threads
+    terminal = os.dup(2)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    clear = CLEAR_LINE_AND_SHOW_CURSOR if os.isatty(terminal) else b""
+    os.write(terminal, clear + said.encode(errors="backslashreplace") + b"\n")
     os._exit(128 + number)
