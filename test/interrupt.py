@@ -64,10 +64,11 @@ def interrupted(command, cwd, after, how="INT"):
     ended = time.monotonic()
     os.close(terminal)
     _, status = os.waitpid(pid, 0)
-    if sent is None:
+    code = os.waitstatus_to_exitcode(status)
+    if sent is None or code == 0:
         return None
     text = ESCAPES.sub("", said.decode(errors="replace")).replace("\r\n", "\n")
-    return End(os.waitstatus_to_exitcode(status), text, ended - sent)
+    return End(code, text, ended - sent)
 
 
 def _hears(pid):
@@ -155,6 +156,7 @@ def main():
     for ways in WAYS:
         command = ("fly", "neuro_adaptive_di", *ways)
         with TemporaryDirectory() as folder:
+            interrupted([AHV, *command, "--out", "compiled"], folder, 600.0)
             started = time.monotonic()
             interrupted([AHV, *command, "--out", "out"], folder, 600.0)
             whole = time.monotonic() - started
