@@ -48,6 +48,12 @@ def end_on_signals() -> None:
             signal.signal(number, _end)
 
 
+def let_no_signal_end() -> None:
+    """From now on signals are ignored: what was to be done is done, and Python tidies up."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def interrupted_says(words: Callable[[], str]) -> None:
     """From now on an interrupted command says `words()` too."""
     global _words

@@ -4,7 +4,7 @@
 import os
 import sys
 
-from ahv_analysis.interrupt import end_on_signals
+from ahv_analysis.interrupt import end_on_signals, let_no_signal_end
 
 
 def main() -> None:
@@ -13,7 +13,10 @@ def main() -> None:
     prepare()
     from ahv_analysis.command.app import app  # seconds, in which a signal may come already
 
-    app()
+    try:
+        app()
+    finally:
+        let_no_signal_end()
 
 
 def prepare() -> None:
