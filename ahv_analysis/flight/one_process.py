@@ -54,9 +54,7 @@ def fly_graph(
     for _ in zip(range(2), fly(case), strict=False):
         pass  # compile the laws before the clock runs
     with signals_wait() as interrupted:
-        return _fly_graph(
-            case, bag, domain, namespace, realtime, on_error, progress, interrupted
-        )
+        return _fly_graph(case, bag, domain, namespace, realtime, on_error, progress, interrupted)
 
 
 def _fly_graph(
