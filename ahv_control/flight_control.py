@@ -10,13 +10,15 @@ from ahv_control.disturbance_learner import (
     learner_step,
     start_learner,
 )
-from ahv_control.inner_loop import InnerLoop, Learned, adaptive_surfaces, nominal_surfaces
+from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_demand
 from ahv_control.intermediate_loop import IntermediateLoop, rate_command
-from ahv_control.newton_raphson import nominal_response
+from ahv_control.law import Commands
+from ahv_control.newton_raphson import nominal_response, solve_surfaces
 from ahv_control.outer_loop import OuterLoop, attitude_command
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
-from ahv_plant.model.vectors import Attitude, Rates, State, Surfaces
+from ahv_plant.model.vectors import Rates, State, Surfaces
 from ahv_plant.numerics.elementwise import elementwise
+from ahv_plant.numerics.optional import optional
 
 # The search for the first command starts here; later ones start at the command before.
 NEUTRAL = Surfaces(0.0, 0.0, 0.0)
@@ -32,47 +34,59 @@ class FlightControl(NamedTuple):
     learner: LearnerSettings | None
 
 
-class Commands(NamedTuple):
-    """What the flight control answers to one state."""
+class Memory(NamedTuple):
+    """What the flight control remembers from one state to the next."""
 
-    attitude: Attitude  # phi*, theta*, psi*
-    rates: Rates  # P*, Q*, R*
-    surfaces: Surfaces
-    throttle: float  # [-] sigma_T
-    status: int  # SolverStatus of the inner loop
+    state: State  # the last one
+    rates: Rates  # [rad/s] commanded then
+    surfaces: Surfaces  # [rad] commanded then
+    learner: LearnerState | None  # at that state; None without a learner
 
 
 @elementwise
-def nominal_control(state: State, previous: Surfaces, settings: FlightControl) -> Commands:
-    """All commands for `state` without a learner; `previous` surfaces were commanded before."""
+def start(state: State, settings: FlightControl) -> tuple[Memory, Commands]:
+    """Memory and commands at the first state of a flight."""
+    return answer(state, first_learner(state, settings.learner), NEUTRAL, settings)
+
+
+@elementwise
+def step(memory: Memory, state: State, settings: FlightControl) -> tuple[Memory, Commands]:
+    """Memory and commands one step later, at `state`."""
+    learner = next_learner(
+        memory.learner, memory.state, memory.surfaces, memory.rates, state, settings.learner
+    )
+    return answer(state, learner, memory.surfaces, settings)
+
+
+@elementwise
+def answer(
+    state: State, learner: LearnerState | None, previous: Surfaces, settings: FlightControl
+) -> tuple[Memory, Commands]:
+    """All commands for `state` with what was learned up to it, if there is a learner.
+
+    The `previous` surfaces [rad] were commanded before.
+    """
     attitude = attitude_command(state, settings.outer)
     rates = rate_command(state, attitude, settings.intermediate)
-    solution = nominal_surfaces(state, rates, previous, settings.inner)
-    throttle = throttle_command(state, solution.surfaces, settings.velocity)
-    return Commands(attitude, rates, solution.surfaces, throttle, solution.status)
+    if learner is None:
+        demand = nominal_demand(state, rates, settings.inner)
+    else:
+        estimate = disturbance_estimate(learner, Rates(state.P, state.Q, state.R))
+        learned = Learned(learner.X_a, learner.X_d, estimate)
+        demand = adaptive_demand(state, rates, learned, settings.inner)
+    surfaces, status = solve_surfaces(state, demand, previous, settings.inner.geometric)
+    throttle = throttle_command(state, surfaces, settings.velocity)
+    commands = Commands(attitude, rates, surfaces, throttle, status)
+    return Memory(state, rates, surfaces, learner), commands
 
 
-@elementwise
-def adaptive_control(
-    state: State, learner: LearnerState, previous: Surfaces, settings: FlightControl
-) -> Commands:
-    """All commands for `state` with what was learned up to it."""
-    attitude = attitude_command(state, settings.outer)
-    rates = rate_command(state, attitude, settings.intermediate)
-    estimate = disturbance_estimate(learner, Rates(state.P, state.Q, state.R))
-    learned = Learned(learner.X_a, learner.X_d, estimate)
-    solution = adaptive_surfaces(state, rates, learned, previous, settings.inner)
-    throttle = throttle_command(state, solution.surfaces, settings.velocity)
-    return Commands(attitude, rates, solution.surfaces, throttle, solution.status)
-
-
-@elementwise
+@optional
 def first_learner(state: State, settings: LearnerSettings) -> LearnerState:
-    """Learner for the first `state` of a flight."""
+    """Learner for the first `state` of a flight; None without `settings`."""
     return start_learner(Rates(state.P, state.Q, state.R), settings.first_estimate)
 
 
-@elementwise
+@optional
 def next_learner(
     learner: LearnerState,
     before: State,
@@ -81,7 +95,10 @@ def next_learner(
     now: State,
     settings: LearnerSettings,
 ) -> LearnerState:
-    """Learner at the state `now`, from the state `before` and what was commanded then."""
+    """Learner at the state `now`, from the state `before` and what was commanded then.
+
+    None without `settings`.
+    """
     return learner_step(
         learner,
         nominal_response(before, surfaces, settings.geometric),
@@ -89,13 +106,3 @@ def next_learner(
         Rates(now.P, now.Q, now.R),
         settings,
     )
-
-
-@elementwise
-def next_adaptive_control(
-    learner: LearnerState, before: State, answer: Commands, now: State, settings: FlightControl
-) -> tuple[LearnerState, Commands]:
-    """Learner and commands at the state `now`; `answer` was the one to the state `before`."""
-    law: LearnerSettings = settings.learner  # type: ignore[assignment]  # it is an adaptive flight
-    learned = next_learner(learner, before, answer.surfaces, answer.rates, now, law)
-    return learned, adaptive_control(now, learned, answer.surfaces, settings)

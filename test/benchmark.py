@@ -36,8 +36,7 @@ TRIALS = 2048
 COUNT = """
 import json
 from ahv_analysis.flight.case import load_case
-from ahv_control.flight_control import NEUTRAL, adaptive_control, first_learner, next_learner
-from ahv_plant.vehicle import vehicle_step
+from ahv_analysis.flight.closed_loop import loop_step, start_loop
 
 counts = {"add": 0, "multiply": 0, "divide": 0}
 
@@ -70,12 +69,9 @@ def number(value):
 
 case = load_case("neuro_adaptive_sc_gdi")
 state, truth, control = number(case.plant.initial), number(case.plant.truth), number(case.control)
-learner = first_learner(state, control.learner)
-answer = adaptive_control(state, learner, number(NEUTRAL), control)
+loop = start_loop(state, control)
 counts.update(dict.fromkeys(counts, 0))
-later = vehicle_step(state, answer.surfaces, answer.throttle, 0.0, truth)
-learner = next_learner(learner, state, answer.surfaces, answer.rates, later, control.learner)
-adaptive_control(later, learner, answer.surfaces, control)
+loop_step(loop, 0, truth, control)
 print(json.dumps(counts))
 """
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 
 from ahv_control.error_dynamics import ErrorDynamics
-from ahv_control.flight_control import FlightControl, nominal_control
+from ahv_control.flight_control import FlightControl, answer
 from ahv_control.inner_loop import InnerLoop, nominal_surfaces
 from ahv_control.intermediate_loop import IntermediateLoop, rate_command
 from ahv_control.newton_raphson import (
@@ -164,14 +164,14 @@ def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous)
     outer = OuterLoop(24000.0, 0.01, math.pi)
     intermediate = IntermediateLoop(0.2, 0.2, 0.2)
     inner, velocity = inner_loop(Rates(2.0, 2.0, 2.0)), VelocityLoop(1786.4, 0.01, False)
-    answer = nominal_control(
-        state, previous, FlightControl(outer, intermediate, inner, velocity, None)
-    )
-    assert answer.attitude == attitude_command(state, outer)
-    assert answer.rates == rate_command(state, answer.attitude, intermediate)
-    surfaces = nominal_surfaces(state, answer.rates, previous, inner)
-    assert (answer.surfaces, answer.status) == surfaces
-    assert answer.throttle == throttle_command(state, answer.surfaces, velocity)
+    control = FlightControl(outer, intermediate, inner, velocity, None)
+    memory, commands = answer(state, None, previous, control)
+    assert commands.attitude == attitude_command(state, outer)
+    assert commands.rates == rate_command(state, commands.attitude, intermediate)
+    surfaces = nominal_surfaces(state, commands.rates, previous, inner)
+    assert (commands.surfaces, commands.status) == surfaces
+    assert commands.throttle == throttle_command(state, commands.surfaces, velocity)
+    assert memory == (state, commands.rates, commands.surfaces, None)
 
 
 @given(SURFACES)

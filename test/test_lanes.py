@@ -19,22 +19,15 @@ from ahv_analysis.campaign.batch import (
 )
 from ahv_analysis.campaign.campaign import Campaign
 from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.closed_loop import loop_step, start_loop
 from ahv_analysis.flight.library import fly
 from ahv_analysis.flight.outcome import Cause, Outcome
-from ahv_control.flight_control import (
-    NEUTRAL,
-    adaptive_control,
-    first_learner,
-    next_learner,
-)
 from ahv_plant.dispersion import Truth, draw_dispersion
 from ahv_plant.level_trim import LevelTrim, level_trim
-from ahv_plant.model.constants import STEP
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.numerics.simd import LANES, load, store, widen
 from ahv_plant.trim import trim
-from ahv_plant.vehicle import vehicle_step
 
 STEPS = 15000
 SEED = 5
@@ -44,16 +37,10 @@ SEED = 5
 def last_of_flight(state, truth, control, steps):
     """State and learner at the end of an adaptive flight; the numbers may be lanes."""
     one = state.u
-    learner = widen(first_learner(state, control.learner), one)
-    answer = widen(adaptive_control(state, learner, NEUTRAL, control), one)
-    for step in range(steps):
-        later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        learner = next_learner(
-            learner, state, answer.surfaces, answer.rates, later, control.learner
-        )
-        answer = widen(adaptive_control(later, learner, answer.surfaces, control), one)
-        state = later
-    return state, learner
+    loop = widen(start_loop(state, control), one)
+    for number in range(steps):
+        loop = widen(loop_step(loop, number, truth, control), one)
+    return loop.state, loop.memory.learner
 
 
 @kernel
@@ -106,6 +93,7 @@ def test_a_lane_has_the_bits_of_the_scalar_run(case, ends):
 
 PLAIN = """
 from ahv_analysis.flight.case import dispersion_parameters, load_case
+from ahv_analysis.flight.closed_loop import loop_step, start_loop
 from ahv_analysis.flight.library import fly
 from ahv_plant.dispersion import draw_dispersion
 
@@ -132,7 +120,7 @@ def test_a_lane_has_the_bits_of_plain_python_floats(ends):
 
 ASSEMBLY = """
 import numpy as np
-from ahv_analysis.campaign.batch import LIKE, adaptive_batch
+from ahv_analysis.campaign.batch import LIKE, batch_outcomes
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.outcome import Outcome
 from ahv_plant.numerics.simd import LANES
@@ -141,8 +129,8 @@ case = load_case("neuro_adaptive_sc_gdi")
 states = np.repeat(np.array(case.plant.initial)[:, None], LANES, axis=1)
 result = np.empty((len(Outcome._fields), LANES))
 truth, control = case.plant.truth, case.control
-adaptive_batch(states, np.ones((9, LANES)), LIKE, truth, control, 1, result)
-print(*adaptive_batch.inspect_asm().values())
+batch_outcomes(states, np.ones((9, LANES)), LIKE, truth, control, 1, result)
+print(*batch_outcomes.inspect_asm().values())
 """
 
 

@@ -5,74 +5,37 @@ import numpy as np
 
 from ahv_analysis.bag.record import Array, FlightRecord
 from ahv_analysis.flight.case import Case
-from ahv_analysis.flight.outcome import START, Outcome, count_step, observer_error
-from ahv_control.flight_control import (
-    NEUTRAL,
-    FlightControl,
-    adaptive_control,
-    first_learner,
-    next_adaptive_control,
-    nominal_control,
-)
+from ahv_analysis.flight.closed_loop import loop_step, start_loop
+from ahv_analysis.flight.outcome import START, Outcome, next_outcome
+from ahv_control.flight_control import FlightControl
 from ahv_plant.dispersion import Dispersion, Truth
 from ahv_plant.level_trim import LevelTrim, level_trim
-from ahv_plant.model.constants import STEP, STEP_NS
+from ahv_plant.model.constants import STEP_NS
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.numerics.simd import LANES, load, store, widen
 from ahv_plant.termination import termination
-from ahv_plant.vehicle import vehicle_step
 
 # What the rows of the arrays are: load() reads the shape of its result from these.
 LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 
 
 @kernel
-def fly_adaptive(state, truth, control, steps):
-    """Outcome of an adaptive flight; the numbers may be lanes."""
-    one = state.u
-    learner = widen(first_learner(state, control.learner), one)
-    answer = widen(adaptive_control(state, learner, NEUTRAL, control), one)
-    outcome = widen(START, one)
-    altitude = control.outer.altitude
-    for step in range(steps):
-        observed = observer_error(state, learner)
-        outcome = count_step(outcome, state, answer, observed, altitude, truth.geometric)
-        later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        learner, answer = next_adaptive_control(learner, state, answer, later, control)
-        answer = widen(answer, one)
-        state = later
-    observed = observer_error(state, learner)
-    return count_step(outcome, state, answer, observed, altitude, truth.geometric)
+def run_outcome(state, truth, control, steps):
+    """Outcome of a flight; the numbers may be lanes."""
+    one, altitude = state.u, control.outer.altitude
+    loop, outcome = widen(start_loop(state, control), one), widen(START, one)
+    for number in range(steps):
+        outcome = next_outcome(outcome, loop, altitude, truth.geometric)
+        loop = widen(loop_step(loop, number, truth, control), one)
+    return next_outcome(outcome, loop, altitude, truth.geometric)
 
 
 @kernel
-def fly_nominal(state, truth, control, steps):
-    """Outcome of a nominal flight; the numbers may be lanes."""
-    one = state.u
-    answer = widen(nominal_control(state, NEUTRAL, control), one)
-    outcome = widen(START, one)
-    observed = widen(0.0, one)
-    altitude = control.outer.altitude
-    for step in range(steps):
-        outcome = count_step(outcome, state, answer, observed, altitude, truth.geometric)
-        state = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        answer = widen(nominal_control(state, answer.surfaces, control), one)
-    return count_step(outcome, state, answer, observed, altitude, truth.geometric)
-
-
-@kernel
-def adaptive_batch(states, dispersions, like, truth, control, steps, result):
-    """Fly a batch of adaptive runs: states (13, LANES) and dispersions (9, LANES) to result."""
+def batch_outcomes(states, dispersions, like, truth, control, steps, result):
+    """Fly a batch of runs: states (13, LANES) and dispersions (9, LANES) to result."""
     truth = Truth(truth.geometric, load(like[1], dispersions), truth.disturbance)
-    store(result, fly_adaptive(load(like[0], states), truth, control, steps))
-
-
-@kernel
-def nominal_batch(states, dispersions, like, truth, control, steps, result):
-    """Fly a batch of nominal runs: states (13, LANES) and dispersions (9, LANES) to result."""
-    truth = Truth(truth.geometric, load(like[1], dispersions), truth.disturbance)
-    store(result, fly_nominal(load(like[0], states), truth, control, steps))
+    store(result, run_outcome(load(like[0], states), truth, control, steps))
 
 
 @kernel
@@ -83,32 +46,15 @@ def trim_batch(dispersions, like, altitude, speed, mass, geometric, result):
 
 
 @kernel
-def adaptive_trajectory(state, truth, control, steps, every, states, commands):
-    """Fly one adaptive run; keep every so many states (13) and commands (10)."""
-    learner = first_learner(state, control.learner)
-    answer = adaptive_control(state, learner, NEUTRAL, control)
-    for step in range(steps + 1):
-        if step % every == 0:
-            _keep(step // every, state, answer, states, commands)
-        if termination(state, truth.geometric) != 0:
-            return step
-        later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        learner, answer = next_adaptive_control(learner, state, answer, later, control)
-        state = later
-    return steps
-
-
-@kernel
-def nominal_trajectory(state, truth, control, steps, every, states, commands):
-    """Fly one nominal run; keep every so many states (13) and commands (10)."""
-    answer = nominal_control(state, NEUTRAL, control)
-    for step in range(steps + 1):
-        if step % every == 0:
-            _keep(step // every, state, answer, states, commands)
-        if termination(state, truth.geometric) != 0:
-            return step
-        state = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        answer = nominal_control(state, answer.surfaces, control)
+def run_trajectory(state, truth, control, steps, every, states, commands):
+    """Fly one run; keep every so many states (13) and commands (10)."""
+    loop = start_loop(state, control)
+    for number in range(steps + 1):
+        if number % every == 0:
+            _keep(number // every, loop.state, loop.commands, states, commands)
+        if termination(loop.state, truth.geometric) != 0:
+            return number
+        loop = loop_step(loop, number, truth, control)
     return steps
 
 
@@ -128,8 +74,8 @@ def fly_trajectory(case: Case, every: int) -> FlightRecord:
     steps, truth = case.plant.steps, case.plant.truth
     states = np.empty((steps // every + 1, len(State._fields)))
     commands = np.empty((steps // every + 1, 10))
-    fly = nominal_trajectory if case.control.learner is None else adaptive_trajectory
-    flown = fly(case.plant.initial, truth, case.control, steps, every, states, commands)
+    start, control = case.plant.initial, case.control
+    flown = run_trajectory(start, truth, control, steps, every, states, commands)
     kept = slice(flown // every + 1)
     return FlightRecord(
         np.arange(steps // every + 1)[kept] * (every * STEP_NS),
@@ -149,11 +95,10 @@ def fly_batch(
 
     Disturbance and kind of altitude are those of `truth`.
     """
-    fly = nominal_batch if control.learner is None else adaptive_batch
     outcomes = np.empty((len(Outcome._fields), LANES))
     rows = []
     for first in range(0, len(states), LANES):
-        fly(
+        batch_outcomes(
             _lanes(states, first),
             _lanes(dispersions, first),
             LIKE,
@@ -181,8 +126,7 @@ def find_trims(
 
 def fly_alone(state: State, truth: Truth, control: FlightControl, steps: int) -> Outcome:
     """Outcome of one run by scalar code: the same bits as in a lane."""
-    fly = fly_nominal if control.learner is None else fly_adaptive
-    return Outcome(*fly(state, truth, control, steps))
+    return Outcome(*run_outcome(state, truth, control, steps))
 
 
 def _lanes(rows: Array, first: int) -> Array:

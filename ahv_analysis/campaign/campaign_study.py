@@ -18,7 +18,7 @@ from ahv_analysis.campaign.summary import exact_interval
 from ahv_analysis.campaign.table import CONTROLLERS, REPORT
 from ahv_analysis.flight.case import Case, load_case, make_case
 from ahv_analysis.flight.library import fly
-from ahv_control.flight_control import NEUTRAL, nominal_control
+from ahv_control.flight_control import start as start_law
 from ahv_plant.dispersion import Dispersion, Truth
 from ahv_plant.model.constants import (
     DEGREES,
@@ -90,12 +90,12 @@ def nose_comes_down(state: State, truth: Truth, before: Surfaces, delay: int) ->
 def beyond_elevons(campaign: Campaign, delay: int) -> set[int]:
     """Runs on vehicles that their elevons cannot save after a delay [steps] in level trim."""
     start, control = campaign.case.plant.initial, campaign.case.control
-    trimmed = nominal_control(start, NEUTRAL, control).surfaces
+    _, commands = start_law(start, control)
     truths = [Truth(dispersion=campaign.dispersion(run)) for run in range(campaign.runs)]
     return {
         run
         for run, truth in enumerate(truths)
-        if not nose_comes_down(start, truth, trimmed, delay)
+        if not nose_comes_down(start, truth, commands.surfaces, delay)
     }
 
 

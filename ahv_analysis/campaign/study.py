@@ -16,6 +16,7 @@ from matplotlib import pyplot
 
 from ahv_analysis.bag.record import record
 from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.closed_loop import Loop, loop_step, start_loop
 from ahv_analysis.flight.library import fly
 from ahv_analysis.report.figures import STYLE
 from ahv_control.disturbance_learner import (
@@ -27,11 +28,9 @@ from ahv_control.disturbance_learner import (
 )
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
 from ahv_control.flight_control import (
-    NEUTRAL,
     FlightControl,
-    adaptive_control,
-    first_learner,
-    next_learner,
+    Memory,
+    answer,
 )
 from ahv_control.newton_raphson import nominal_response
 from ahv_plant.dispersion import (
@@ -41,10 +40,9 @@ from ahv_plant.dispersion import (
     draw_dispersion,
 )
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP, UNSTART_ALPHA
-from ahv_plant.model.vectors import Rates, State, Surfaces
+from ahv_plant.model.vectors import Rates, State
 from ahv_plant.numerics.elementary import atan
 from ahv_plant.termination import termination
-from ahv_plant.vehicle import vehicle_step
 
 SEED = 20
 RUNS = 200
@@ -63,16 +61,11 @@ class Score(NamedTuple):
 
 
 @numba.njit(error_model="numpy")
-def explicit_step(
-    learner: LearnerState,
-    before: State,
-    surfaces: Surfaces,
-    command: Rates,
-    settings: LearnerSettings,
-) -> LearnerState:
+def explicit_step(memory: Memory, settings: LearnerSettings) -> LearnerState:
     """Learner one step later by explicit Euler, the obvious way and the wrong one."""
+    learner, before, command = memory.learner, memory.state, memory.rates
     rates = Rates(before.P, before.Q, before.R)
-    response = nominal_response(before, surfaces, settings.geometric)
+    response = nominal_response(before, memory.surfaces, settings.geometric)
     estimate = disturbance_estimate(learner, rates)
     P, Q, R = before.P * DEGREES, before.Q * DEGREES, before.R * DEGREES
     direction = learning_direction(P, Q, R, settings.gamma, settings.theta)
@@ -97,28 +90,24 @@ def fly_study(
     state: State, settings: FlightControl, truth: Truth, explicit: bool, steps: int
 ) -> tuple[int, float, float, float]:
     """Fly until the end or the loss of the vehicle; sums for `Score`."""
-    learner = first_learner(state, settings.learner)
-    answer = adaptive_control(state, learner, NEUTRAL, settings)
+    loop = start_loop(state, settings)
     largest, follow, rough = 0.0, 0.0, 0.0
-    for step in range(steps):
+    for number in range(steps):
+        state, before = loop.state, loop.commands.surfaces
         alpha = abs(atan(state.w / state.u))
         if not alpha <= UNSTART_ALPHA or termination(state, truth.geometric) != 0:
-            return step, largest, follow, rough
-        later = vehicle_step(state, answer.surfaces, answer.throttle, step * STEP, truth)
-        before = answer.surfaces
-        step_learner = (learner, state, before, answer.rates)
+            return number, largest, follow, rough
+        later = loop_step(loop, number, truth, settings)
         if explicit:
-            learner = explicit_step(*step_learner, settings.learner)
-        else:
-            learner = next_learner(*step_learner, later, settings.learner)
-        answer = adaptive_control(later, learner, before, settings)
-        state = later
+            learner = explicit_step(loop.memory, settings.learner)
+            later = Loop(later.state, *answer(later.state, learner, before, settings))
+        loop = later
+        state, learner, now = loop.state, loop.memory.learner, loop.commands.surfaces
         a, d = learner.X_a, learner.X_d
         e = max(abs(state.P - a.P), abs(state.Q - a.Q), abs(state.R - a.R))
         largest = max(largest, e)
         P, Q, R = state.P - d.P, state.Q - d.Q, state.R - d.R
         follow += P * P + Q * Q + R * R
-        now = answer.surfaces
         rough += (
             abs(now.right_elevon - before.right_elevon)
             + abs(now.left_elevon - before.left_elevon)

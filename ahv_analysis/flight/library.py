@@ -8,16 +8,10 @@ from typing import NamedTuple
 
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
+from ahv_analysis.flight.closed_loop import Loop, loop_step, start_loop
 from ahv_analysis.interrupt import signals_wait
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
-from ahv_control.flight_control import (
-    NEUTRAL,
-    Commands,
-    adaptive_control,
-    first_learner,
-    next_adaptive_control,
-    nominal_control,
-)
+from ahv_control.law import Commands
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.topics import (
@@ -34,7 +28,6 @@ from ahv_msgs_py.topics import (
 from ahv_plant.model.constants import STEP, STEP_NS
 from ahv_plant.model.vectors import Rates, State
 from ahv_plant.termination import termination_reason
-from ahv_plant.vehicle import vehicle_step
 
 CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
 INTERRUPTED = "interrupted"  # why a flight ended early, where a signal does not end the program
@@ -52,26 +45,20 @@ class Step(NamedTuple):
 
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the model no longer describes the vehicle."""
-    state, truth, control = case.plant.initial, case.plant.truth, case.control
-    learner = None if control.learner is None else first_learner(state, control.learner)
-    if learner is None:
-        commands = nominal_control(state, NEUTRAL, control)
-    else:
-        commands = adaptive_control(state, learner, NEUTRAL, control)
-    for step in range(case.plant.steps):
-        later = State(
-            *vehicle_step(state, commands.surfaces, commands.throttle, step * STEP, truth)
-        )
-        reason = termination_reason(later, truth.geometric, (step + 1) * STEP)
-        yield Step(step * STEP_NS, state, commands, learner, reason)
+    truth, control = case.plant.truth, case.control
+    loop = start_loop(case.plant.initial, control)
+    for number in range(case.plant.steps):
+        later = loop_step(loop, number, truth, control)
+        reason = termination_reason(later.state, truth.geometric, (number + 1) * STEP)
+        yield _step(number, loop, reason)
         if reason:
             return
-        if learner is None:
-            commands = nominal_control(later, commands.surfaces, control)
-        else:
-            learner, commands = next_adaptive_control(learner, state, commands, later, control)
-        state = later
-    yield Step(case.plant.steps * STEP_NS, state, commands, learner, "")
+        loop = later
+    yield _step(case.plant.steps, loop, "")
+
+
+def _step(number: int, loop: Loop, ended_early: str) -> Step:
+    return Step(number * STEP_NS, loop.state, loop.commands, loop.memory.learner, ended_early)
 
 
 def fly_library(

@@ -7,8 +7,8 @@ Element-wise, so that a run counts the same alone and in a lane.
 from enum import IntEnum
 from typing import NamedTuple
 
+from ahv_analysis.flight.closed_loop import Loop
 from ahv_control.disturbance_learner import LearnerState
-from ahv_control.flight_control import Commands
 from ahv_plant.model.constants import UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementary import atan_ratio
@@ -49,8 +49,10 @@ START = Outcome(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.
 
 
 @elementwise
-def observer_error(state: State, learner: LearnerState) -> float:
-    """Largest |X - X_a| [rad/s] of the three channels."""
+def observer_error(state: State, learner: LearnerState | None) -> float:
+    """Largest |X - X_a| [rad/s] of the three channels; zero without a learner."""
+    if learner is None:
+        return select(state.P == state.P, 0.0, 0.0)  # as wide as P
     X_a = learner.X_a
     return max(abs(state.P - X_a.P), abs(state.Q - X_a.Q), abs(state.R - X_a.R))
 
@@ -66,15 +68,13 @@ def cause_now(state: State, status: int, geometric: bool) -> float:
 
 
 @elementwise
-def count_step(
-    outcome: Outcome,
-    state: State,
-    answer: Commands,
-    observed: float,
-    altitude: float,
-    geometric: bool,
-) -> Outcome:
-    """Outcome after one more state and its answer; once a run has failed nothing changes."""
+def next_outcome(outcome: Outcome, loop: Loop, altitude: float, geometric: bool) -> Outcome:
+    """Outcome after one more state and its answer; once a run has failed nothing changes.
+
+    `altitude` [m] is h*; `geometric` says which altitude h is.
+    """
+    state, answer = loop.state, loop.commands
+    observed = observer_error(state, loop.memory.learner)
     alpha = abs(atan_ratio(state.w, state.u))
     v = abs(state.v)
     beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more

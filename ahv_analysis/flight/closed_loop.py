@@ -1,0 +1,41 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""The closed loop: flight control and true vehicle, one step at a time.
+
+Element-wise, so that it is the same in plain Python, compiled, and in lanes. Whoever flies, calls
+`start_loop` and `loop_step` and looks at what is between them: the outcome of a run, a trajectory
+to be drawn, a bag. The graph's nodes close the same loop by messages.
+"""
+
+from typing import NamedTuple
+
+from ahv_control.flight_control import FlightControl, Memory, start, step
+from ahv_control.law import Commands
+from ahv_plant.dispersion import Truth
+from ahv_plant.model.constants import STEP
+from ahv_plant.model.vectors import State
+from ahv_plant.numerics.elementwise import elementwise
+from ahv_plant.vehicle import vehicle_step
+
+
+class Loop(NamedTuple):
+    """The closed loop at one step."""
+
+    state: State  # true
+    memory: Memory  # of the flight control
+    commands: Commands  # that answer the state
+
+
+@elementwise
+def start_loop(state: State, control: FlightControl) -> Loop:
+    """Loop at the first state of a flight."""
+    memory, commands = start(state, control)
+    return Loop(state, memory, commands)
+
+
+@elementwise
+def loop_step(loop: Loop, number: int, truth: Truth, control: FlightControl) -> Loop:
+    """Loop one step later; `number` counts the steps flown before."""
+    held = loop.commands
+    state = vehicle_step(loop.state, held.surfaces, held.throttle, number * STEP, truth)
+    memory, commands = step(loop.memory, state, control)
+    return Loop(state, memory, commands)
