@@ -34,34 +34,32 @@ class FlightControl(NamedTuple):
     learner: LearnerSettings | None
 
 
-class Memory(NamedTuple):
-    """What the flight control remembers from one state to the next."""
-
-    state: State  # the last one
-    rates: Rates  # [rad/s] commanded then
-    surfaces: Surfaces  # [rad] commanded then
-    learner: LearnerState | None  # at that state; None without a learner
+@elementwise
+def start(state: State, settings: FlightControl) -> tuple[LearnerState | None, Commands]:
+    """Learner, if there is one, and commands at the first state of a flight."""
+    learner = first_learner(state, settings.learner)
+    return learner, answer(state, learner, NEUTRAL, settings)
 
 
 @elementwise
-def start(state: State, settings: FlightControl) -> tuple[Memory, Commands]:
-    """Memory and commands at the first state of a flight."""
-    return answer(state, first_learner(state, settings.learner), NEUTRAL, settings)
-
-
-@elementwise
-def step(memory: Memory, state: State, settings: FlightControl) -> tuple[Memory, Commands]:
-    """Memory and commands one step later, at `state`."""
+def step(
+    learner: LearnerState | None,
+    before: State,
+    commands: Commands,
+    state: State,
+    settings: FlightControl,
+) -> tuple[LearnerState | None, Commands]:
+    """Learner and commands at `state`; `commands` answered the state `before`."""
     learner = next_learner(
-        memory.learner, memory.state, memory.surfaces, memory.rates, state, settings.learner
+        learner, before, commands.surfaces, commands.rates, state, settings.learner
     )
-    return answer(state, learner, memory.surfaces, settings)
+    return learner, answer(state, learner, commands.surfaces, settings)
 
 
 @elementwise
 def answer(
     state: State, learner: LearnerState | None, previous: Surfaces, settings: FlightControl
-) -> tuple[Memory, Commands]:
+) -> Commands:
     """All commands for `state` with what was learned up to it, if there is a learner.
 
     The `previous` surfaces [rad] were commanded before.
@@ -76,8 +74,7 @@ def answer(
         demand = adaptive_demand(state, rates, learned, settings.inner)
     surfaces, status = solve_surfaces(state, demand, previous, settings.inner.geometric)
     throttle = throttle_command(state, surfaces, settings.velocity)
-    commands = Commands(attitude, rates, surfaces, throttle, status)
-    return Memory(state, rates, surfaces, learner), commands
+    return Commands(attitude, rates, surfaces, throttle, status)
 
 
 @optional

@@ -3,11 +3,13 @@
 
 A law is a value, its settings, with two element-wise functions:
 
-    start(state, settings) -> memory, commands         at the first state of a flight
-    step(memory, state, settings) -> memory, commands  at every state after that
+    start(state, settings) -> memory, commands
+    step(memory, before, commands, state, settings) -> memory, commands
 
-The memory is the law's own, a named tuple of numbers. `ahv_control.flight_control` has those of
-the report; `ahv_analysis.flight.closed_loop` closes the loop around them.
+The first is for the first state of a flight, the second for every state after it: `before` is the
+state one step ago, `commands` what was answered to it. The memory is the law's own: what else it
+keeps from step to step, numbers in named tuples or None. `ahv_control.flight_control` has the laws
+of the report; the closed loop calls them.
 """
 
 from typing import NamedTuple

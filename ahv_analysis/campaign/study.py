@@ -29,7 +29,6 @@ from ahv_control.disturbance_learner import (
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
 from ahv_control.flight_control import (
     FlightControl,
-    Memory,
     answer,
 )
 from ahv_control.newton_raphson import nominal_response
@@ -61,17 +60,17 @@ class Score(NamedTuple):
 
 
 @numba.njit(error_model="numpy")
-def explicit_step(memory: Memory, settings: LearnerSettings) -> LearnerState:
+def explicit_step(loop: Loop, settings: LearnerSettings) -> LearnerState:
     """Learner one step later by explicit Euler, the obvious way and the wrong one."""
-    learner, before, command = memory.learner, memory.state, memory.rates
+    learner, before, answered = loop.memory, loop.state, loop.commands
     rates = Rates(before.P, before.Q, before.R)
-    response = nominal_response(before, memory.surfaces, settings.geometric)
+    response = nominal_response(before, answered.surfaces, settings.geometric)
     estimate = disturbance_estimate(learner, rates)
     P, Q, R = before.P * DEGREES, before.Q * DEGREES, before.R * DEGREES
     direction = learning_direction(P, Q, R, settings.gamma, settings.theta)
     a, d, k, b = learner.X_a, learner.X_d, settings.k_ap, settings.k_b
     e_P, e_Q, e_R = P - a.P * DEGREES, Q - a.Q * DEGREES, R - a.R * DEGREES
-    fall = error_decay(d, command, settings.tracking)
+    fall = error_decay(d, answered.rates, settings.tracking)
     return LearnerState(
         Rates(
             a.P + STEP * (response.P + estimate.P + k.P * e_P * RADIANS),
@@ -99,10 +98,11 @@ def fly_study(
             return number, largest, follow, rough
         later = loop_step(loop, number, truth, settings)
         if explicit:
-            learner = explicit_step(loop.memory, settings.learner)
-            later = Loop(later.state, *answer(later.state, learner, before, settings))
+            learner = explicit_step(loop, settings.learner)
+            commands = answer(later.state, learner, before, settings)
+            later = Loop(later.state, learner, commands)
         loop = later
-        state, learner, now = loop.state, loop.memory.learner, loop.commands.surfaces
+        state, learner, now = loop.state, loop.memory, loop.commands.surfaces
         a, d = learner.X_a, learner.X_d
         e = max(abs(state.P - a.P), abs(state.Q - a.Q), abs(state.R - a.R))
         largest = max(largest, e)

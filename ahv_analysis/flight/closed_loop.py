@@ -8,7 +8,8 @@ to be drawn, a bag. The graph's nodes close the same loop by messages.
 
 from typing import NamedTuple
 
-from ahv_control.flight_control import FlightControl, Memory, start, step
+from ahv_control.disturbance_learner import LearnerState
+from ahv_control.flight_control import FlightControl, start, step
 from ahv_control.law import Commands
 from ahv_plant.dispersion import Truth
 from ahv_plant.model.constants import STEP
@@ -21,7 +22,7 @@ class Loop(NamedTuple):
     """The closed loop at one step."""
 
     state: State  # true
-    memory: Memory  # of the flight control
+    memory: LearnerState | None  # of the flight control
     commands: Commands  # that answer the state
 
 
@@ -37,5 +38,5 @@ def loop_step(loop: Loop, number: int, truth: Truth, control: FlightControl) -> 
     """Loop one step later; `number` counts the steps flown before."""
     held = loop.commands
     state = vehicle_step(loop.state, held.surfaces, held.throttle, number * STEP, truth)
-    memory, commands = step(loop.memory, state, control)
+    memory, commands = step(loop.memory, loop.state, held, state, control)
     return Loop(state, memory, commands)

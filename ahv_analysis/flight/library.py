@@ -58,7 +58,7 @@ def fly(case: Case) -> Iterator[Step]:
 
 
 def _step(number: int, loop: Loop, ended_early: str) -> Step:
-    return Step(number * STEP_NS, loop.state, loop.commands, loop.memory.learner, ended_early)
+    return Step(number * STEP_NS, loop.state, loop.commands, loop.memory, ended_early)
 
 
 def fly_library(

@@ -74,7 +74,7 @@ def next_outcome(outcome: Outcome, loop: Loop, altitude: float, geometric: bool)
     `altitude` [m] is h*; `geometric` says which altitude h is.
     """
     state, answer = loop.state, loop.commands
-    observed = observer_error(state, loop.memory.learner)
+    observed = observer_error(state, loop.memory)
     alpha = abs(atan_ratio(state.w, state.u))
     v = abs(state.v)
     beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more
