@@ -22,7 +22,7 @@ SOURCES = {
     if not path.name.endswith(("_node.py", "__init__.py"))
 }
 # Tools, and what crosses a topic: no equation of the report stands behind them.
-OWN = {f"ahv_plant.numerics.{name}" for name in ("elementwise", "simd", "elementary")}
+OWN = {f"ahv_plant.numerics.{name}" for name in ("elementwise", "simd", "elementary", "optional")}
 OWN |= {
     "ahv_plant.model.vectors",
     "ahv_plant.termination",
