@@ -14,7 +14,7 @@ from ahv_msgs_py.graph import NODES, listeners, sender
 from ahv_msgs_py.node.faults import fault_rows
 from ahv_msgs_py.node.managed_node import SHELL_PARAMETERS
 from ahv_msgs_py.parameters import Parameter, Value
-from ahv_msgs_py.topics import BY_NAME, FINITE, LOOP_TOPICS, VIEWER_TOPICS, LoopTopic
+from ahv_msgs_py.topics import BY_NAME, FINITE, FLIGHT, LOOP_TOPICS, VIEWER_TOPICS, LoopTopic
 
 ROOT = Path(__file__).resolve().parent.parent
 MARKED = re.compile(r"(?<=<!-- reference )(\w+)( -->\n).*?(?=<!-- end -->)", re.DOTALL)
@@ -61,7 +61,7 @@ def loop_topics() -> str:
     parts += (
         f"\n### {topic.name}\n\n"
         f"{topic.description[0].upper()}{topic.description[1:]}.\n\n{_numbers(topic)}"
-        for topic in LOOP_TOPICS
+        for topic in (*LOOP_TOPICS, FLIGHT)
     )
     return "".join(parts)
 

@@ -121,6 +121,16 @@ LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)
 LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS
 BY_NAME = {relative(topic.name): topic for topic in LOOP_TOPICS}  # as the graph has them
 
+# Not of every step: once a second, and at the end of the flight.
+FLYING, FLOWN, ENDED_EARLY = range(3)
+FLIGHT = LoopTopic(
+    "/ahv/flight",
+    NamedVector(EARTH_FRAME, ("planned", "steps", "end")),
+    "1, 1, 1",
+    ((0.0, 1e9), (0.0, 1e9), (FLYING, ENDED_EARLY)),
+    "steps planned and flown; end is 0 in flight, 1 flown to the end, 2 ended early",
+)
+
 CLOCK = ViewerTopic("/clock", "rosgraph_msgs/msg/Clock", 4, "simulated time at 100 Hz")
 ODOMETRY = ViewerTopic(
     "/ahv/odometry",

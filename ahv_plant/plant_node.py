@@ -26,6 +26,11 @@ from ahv_msgs_py.topics import (
     BODY_FRAME,
     CLOCK,
     EARTH_FRAME,
+    ENDED_EARLY,
+    FLIGHT,
+    FLOWN,
+    FLYING,
+    LOOP_TOPICS,
     MARKER,
     ODOMETRY,
     ODOMETRY_ENU,
@@ -92,7 +97,7 @@ class PlantNode(BaseNode):
     def start(self) -> None:
         """Open the topics; the flight starts, or goes on, when as many listen as should."""
         self._flying = False
-        self._listened = 0
+        self._listeners: dict[bytes, str] = {}  # nodes that hear the state, by their GID
         self._surfaces = Held(SURFACE_COMMAND, (0.0, 0.0, 0.0))
         self._throttle = Held(THROTTLE_COMMAND, (SAFE_THROTTLE,))
         self._latencies = array("q")  # [ns] from a state to both its commands
@@ -111,6 +116,7 @@ class PlantNode(BaseNode):
         self._odometry_enu = self.publisher(ODOMETRY_ENU.type_name, ODOMETRY_ENU.name, viewers)
         self._marker = self.publisher(MARKER.type_name, MARKER.name, viewers)
         self._transform = self._transform_publisher(viewers)
+        self._send_flight = self.sender(FLIGHT)
         self._send_state = self.sender(STATE, self._listeners_changed)
 
     def _transform_publisher(self, viewers: QoSProfile) -> Any:
@@ -122,27 +128,49 @@ class PlantNode(BaseNode):
 
     def _listeners_changed(self, matched: Any) -> None:
         """Start the flight when as many listen as should; say so when some have gone."""
-        wanted = int(self.settings["listeners"])
-        if not self._flying and matched.current_count >= wanted:
-            self._flying = True
-            self.announce(self.step * STEP_NS, OK, "flying", steps=self.flight.steps)
-            if self.realtime:
-                timer = self.create_timer(STEP, self._tick)
-                self._opened.append(partial(self.destroy_timer, timer))
-                self._ticked = time.monotonic_ns()
-            self._publish()
-        elif matched.current_count < min(wanted, self._listened) and not self.finished.done():
-            self.fault(
-                self.step * STEP_NS,
-                Fault.LISTENER_LOST,
-                f"{matched.current_count} of {wanted} subscribers of the state are left",
-            )
-        self._listened = matched.current_count
+        if self.finished.done():
+            return
+        if self._flying:
+            self._check_listeners()
+        elif matched.current_count >= int(self.settings["listeners"]):
+            self._start_flight()
+
+    def _start_flight(self) -> None:
+        """Send the first state, unless nobody can know whose commands would be obeyed."""
+        for topic in LOOP_TOPICS:
+            name = self.full_name(topic)
+            publishers = self.count_publishers(name)
+            if publishers > 1 and topic is not STATE:  # which a plant that was killed may yet have
+                reason = f"{name} has {publishers} publishers: end all but one of them"
+                self._finish(self.step * STEP_NS, ERROR, f"refused to fly: {reason}")
+                return
+        self._flying = True
+        self.announce(self.step * STEP_NS, OK, "flying", steps=self.flight.steps)
+        if self.realtime:
+            timer = self.create_timer(STEP, self._tick)
+            self._opened.append(partial(self.destroy_timer, timer))
+            self._ticked = time.monotonic_ns()
+        self._publish()
+
+    def _check_listeners(self) -> None:
+        """Name the nodes of the graph that do not listen to the state any more."""
+        listeners = {
+            bytes(one.endpoint_gid): one.node_name
+            for one in self.get_subscriptions_info_by_topic(self.full_name(STATE))
+            if one.node_namespace == self.get_namespace()
+        }
+        for gid in self._listeners.keys() - listeners.keys():
+            name = self._listeners[gid]
+            text = f"{name} does not listen to the state any more"
+            self.fault(self.step * STEP_NS, Fault.LISTENER_LOST, text)
+        self._listeners = listeners
 
     def _publish(self) -> None:
         stamp = self.step * STEP_NS
         self.now = stamp
         self._send_clock.publish(clock_bytes(stamp))
+        if stamp % NANOSECONDS == 0:
+            self._send_flight(stamp, (self.flight.steps, self.step, FLYING))
         if not self.realtime and stamp % NANOSECONDS == 0 and stamp:
             self.report_health(stamp)
         if self.realtime:
@@ -151,6 +179,8 @@ class PlantNode(BaseNode):
         self._send_state(stamp, self.state)
         if self.step % VIEWER_PERIOD == 0:  # while the controllers are at work
             self._publish_for_viewers(stamp)
+        if stamp % NANOSECONDS == 0:
+            self._check_listeners()
 
     # Lockstep
 
@@ -236,6 +266,8 @@ class PlantNode(BaseNode):
             for name, share in (("p50", 0.5), ("p99", 0.99), ("max", 1.0)):
                 facts[f"latency_ms_{name}"] = f"{percentile(ordered, share) * MILLISECONDS:.3f}"
         self.results = facts
+        end = ENDED_EARLY if reason else FLOWN
+        self._send_flight((self.step + 1) * STEP_NS, (self.flight.steps, self.step, end))
         self.announce(stamp, level, reason or "flown to the end", **facts)
         self.get_logger().info(
             f"flight over after {self.step} steps: {reason or 'flown to its end'}"

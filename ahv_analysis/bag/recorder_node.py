@@ -7,27 +7,26 @@ from functools import partial
 from pathlib import Path
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.node.base_node import BaseNode
-from ahv_msgs_py.node.health import ERROR, OK
-from ahv_msgs_py.node.messages import message_class
+from ahv_msgs_py.node.guard import Guard, Refusal
+from ahv_msgs_py.node.health import ERROR, OK, WARN
+from ahv_msgs_py.node.messages import general_reader, message_class
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.quality import quality
-from ahv_msgs_py.node.subscription import Subscription
+from ahv_msgs_py.node.subscription import Subscription, gids
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import (
-    DIAGNOSTICS,
+    FLIGHT,
+    FLYING,
     LOOP_TOPICS,
-    NAMESPACE,
     NOMINAL_TOPICS,
     VIEWER_TOPICS,
     LoopTopic,
     relative,
-    within,
 )
 
 STOP, CONTINUE = "stop", "continue"
@@ -45,6 +44,7 @@ PLANT = f"{NAMESPACE}/plant"  # who says that the flight is over
 POLL = 0.02  # [s] of wall time between looks at the topics
 POLLS = 5  # looks that a chunk has the messages of
 QUIET = 0.5  # [s] after the end of a flight in real time, for what is still under way
+LONGEST_WAIT = 5.0  # [s] in lockstep, where all messages come
 
 
 class RecorderNode(BaseNode):
@@ -67,9 +67,9 @@ class RecorderNode(BaseNode):
         self.failure: BagError | None = None
         self._bag: BagWriter | None = None
         self._polls = 0
+        self._filed: dict[tuple[str, bytes], int] = {}  # newest message of topic and publisher
         self._steps: int | None = None  # of the flight, once it is over
         self._over = 0.0  # [s] by the steady clock when it was
-        self._flown: Sequence[LoopTopic] = ()  # topics of the loop that flew
 
     def prepare(self, settings: dict[str, Value]) -> None:
         """Make the bag."""
@@ -84,7 +84,7 @@ class RecorderNode(BaseNode):
                 background=self.realtime,
                 names={
                     topic.name: self.resolve_topic_name(relative(topic.name))
-                    for topic in (*LOOP_TOPICS, *VIEWER_TOPICS)
+                    for topic in (*LOOP_TOPICS, FLIGHT, *VIEWER_TOPICS)
                 },
             )
         except BagError as error:
@@ -93,7 +93,15 @@ class RecorderNode(BaseNode):
     def start(self) -> None:
         """Listen to every topic; in real time as in lockstep nothing may be missed."""
         durable = not self.realtime
+        self._end_guard = Guard(
+            FLIGHT,
+            general_reader(FLIGHT.layout),
+            time.monotonic_ns,
+            realtime=False,
+            publishers=partial(gids, self, self.full_name(FLIGHT)),
+        )
         topics = [(topic.name, topic.layout.type_name, durable) for topic in LOOP_TOPICS]
+        topics.append((FLIGHT.name, FLIGHT.layout.type_name, True))
         topics += [(topic.name, topic.type_name, topic.durable) for topic in VIEWER_TOPICS]
         for name, type_name, durable in topics:
             try:
@@ -117,25 +125,34 @@ class RecorderNode(BaseNode):
             self._bag.flush()
         if self._steps is None:
             return
+        waited = time.monotonic() - self._over
         if self.failure is not None:
             self._end(str(self.failure))
         elif self.realtime:  # messages may be missing; what comes comes soon
-            if time.monotonic() - self._over > QUIET:
+            if waited > QUIET:
                 self._end("")
-        elif not self.missing(self._flown, self._steps):
+        elif waited > LONGEST_WAIT or not self.missing(self._flown(), self._steps):
             self._end("")
 
     def _take(self) -> None:
         for topic, subscription in self._polled.items():
-            messages = [data for data, _ in subscription]
+            taken = [message for message in subscription if self._is_new(topic, *message)]
+            messages = [data for data, _, _ in taken]
             if messages and self.failure is None:
                 try:
                     self._bag.write(topic, *messages)
                 except BagError as error:
                     self._fail(error)
-            if topic == DIAGNOSTICS.name:
-                for data in messages:
-                    self._read_status(data)
+            if topic == FLIGHT.name:
+                for data, publisher, _ in taken:
+                    self._read_flight(data, publisher)
+
+    def _is_new(self, topic: str, data: bytes, publisher: bytes, number: int) -> bool:
+        """Whether a message is not in the bag yet: who starts to listen again is sent it again."""
+        new = number > self._filed.get((topic, publisher), 0)
+        if new:
+            self._filed[topic, publisher] = number
+        return new
 
     def _fail(self, error: BagError) -> None:
         """Say once that the recording has ended, and end the node if it is set so."""
@@ -149,18 +166,24 @@ class RecorderNode(BaseNode):
         if not self.finished.done():
             self.finished.set_result(reason)
 
-    def _read_status(self, data: bytes) -> None:
+    def _read_flight(self, data: bytes, publisher: bytes) -> None:
         """Learn from the plant that the flight is over, and after how many steps."""
-        for status in deserialize_message(data, DiagnosticArray).status:
-            facts = {fact.key: fact.value for fact in status.values}
-            if status.name == within(self.get_namespace(), PLANT) and "over" in facts:
-                self._steps = int(facts["steps"])
-                self._over = time.monotonic()
-                self._flown = [
-                    topic
-                    for topic in LOOP_TOPICS
-                    if topic in NOMINAL_TOPICS or self.count_publishers(relative(topic.name))
-                ]
+        try:
+            _, (_, steps, end) = self._end_guard.read(data, publisher, None)
+        except Refusal as refusal:
+            self.fault(self._bag.now, refusal.fault, f"{self.full_name(FLIGHT)}: {refusal}")
+            return
+        self._steps = None if end == FLYING else int(steps)
+        self._over = time.monotonic()
+
+    def _flown(self) -> list[LoopTopic]:
+        """Topics of the loop that the flight has."""
+        return [one for one in LOOP_TOPICS if one in NOMINAL_TOPICS or self._bag.counts[one.name]]
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the topics, and say that what follows is not recorded."""
+        self.announce(self._bag.now, WARN, "not recording: deactivated")
+        return super().on_deactivate(state)
 
     def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:
         """How many messages of these topics are still to come from a flight of so many steps."""

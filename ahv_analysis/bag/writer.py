@@ -38,7 +38,7 @@ from ahv_analysis.bag.metadata import (
 )
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.topics import LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
+from ahv_msgs_py.topics import FLIGHT, LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
 
 _FOREVER = QosTime(2147483647, 4294967295)
 _QOS = Qos(
@@ -121,7 +121,7 @@ class BagWriter:
         """File notes, message definitions and topics, before any message."""
         self._file.add_metadata(metadata_record(self._metadata()))
         store = get_typestore(Stores.ROS2_JAZZY)
-        topics = [(topic.name, topic.layout.type_name, 4) for topic in LOOP_TOPICS]
+        topics = [(topic.name, topic.layout.type_name, 4) for topic in (*LOOP_TOPICS, FLIGHT)]
         topics += [(topic.name, topic.type_name, topic.stamp_offset) for topic in VIEWER_TOPICS]
         qos = qos_text([_QOS])
         schemas: dict[str, int] = {}
@@ -148,6 +148,9 @@ class BagWriter:
 
     def flush(self) -> None:
         """Bring what has come to the disk, or on its way there in the background."""
+        if self.failure is None and not (self.path / self._name).exists():
+            end = self._file.contents.end / NANOSECONDS
+            self.failure = BagError(f"the bag {self.path} was deleted at {end:g} s of the flight")
         most = max(len(inbox.messages) for inbox in self._inboxes.values())
         for _ in range(ceil(most / LONGEST)):
             chunk = self._chunk()

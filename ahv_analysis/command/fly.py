@@ -23,6 +23,7 @@ from ahv_analysis.command.console import (
     progress_bar,
     show_table,
 )
+from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.interrupt import interrupted_says, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
@@ -37,6 +38,9 @@ class CaseCommand(TyperCommand):
 
         with formatter.section("Cases"):
             formatter.write_text(", ".join(case_names()))
+
+
+INCOMPLETE = 3  # exit code of a flight that the bag does not hold all of
 
 
 class Engine(StrEnum):
@@ -79,10 +83,10 @@ def fly(
 
     The bag goes to OUT/bag (MCAP), the summary to OUT/summary.json.
     """
-    from ahv_analysis.bag.reader import read_bag
+    from ahv_analysis.bag.reader import flight_of, load_bag
     from ahv_analysis.flight.case import load_case
     from ahv_analysis.flight.library import fly_library
-    from ahv_analysis.flight.summary import summarize
+    from ahv_analysis.flight.summary import missing_states, summarize
 
     if engine == Engine.library and (realtime or processes):
         raise UsageError("--realtime and --processes are for the graph, not for --engine library")
@@ -104,10 +108,16 @@ def fly(
             ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
         else:
             ended_early, wall = fly_library(flight, bag, progress=progress)
-    record = read_bag(bag)
+    recorded = load_bag(bag)
+    try:
+        record = flight_of(recorded)
+    except BagError as error:
+        raise GraphError(ended_early or str(error)) from error
+    flown = record.stamps[-1] // STEP_NS if ended_early else flight.plant.steps
+    missing = missing_states(recorded, int(flown))
     summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
     summary["dispersion"] = flight.plant.truth.dispersion._asdict()
-    summary |= summarize(record, ended_early, flight.control)
+    summary |= summarize(record, ended_early, flight.control, missing)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     with signals_wait():
         summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
@@ -117,6 +127,8 @@ def fly(
         _print_summary(summary)
     if ended_early:
         raise typer.Exit(1)
+    if missing:
+        raise typer.Exit(INCOMPLETE)
 
 
 def _what_is_left(reported: Reported, bag: Path) -> str:
@@ -173,6 +185,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
         ("fuel", f"{summary['fuel_kg']:.0f} kg"),
         ("final speed u", f"{final['u']:.2f} m/s"),
         ("final altitude", f"{final['h']:.1f} m"),
+        ("not recorded", f"{summary['missing_steps']} steps"),
         ("flown", f"{summary['steps']} steps in {summary['wall_s']:.2f} s"),
         ("pace", f"{summary['real_time_factor']:.0f} times real time"),
         ("bag", summary["bag"]),

@@ -158,8 +158,9 @@ def _drain(
     executor.spin_until_future_complete(recorder.finished, LONGEST_SILENCE)
     if recorder.realtime or recorder.failure is not None:
         return  # messages may be missing, and are counted
-    if not recorder.finished.done():
-        raise GraphError(f"the recorder missed {recorder.missing(topics, steps)} messages")
+    missing = recorder.missing(topics, steps)
+    if missing:
+        raise GraphError(f"the recorder missed {missing} messages")
     surplus = -recorder.balance(topics, steps)
     if surplus:
         raise GraphError(

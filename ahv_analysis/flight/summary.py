@@ -5,29 +5,49 @@ from typing import Any
 
 import numpy as np
 
+from ahv_analysis.bag.reader import Bag
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.flight.outcome import Cause, cause_now
 from ahv_analysis.report.metrics import fuel, margins
 from ahv_control.flight_control import NEUTRAL, FlightControl
 from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
-from ahv_plant.model.constants import DEGREES
+from ahv_msgs_py.topics import STATE
+from ahv_plant.model.constants import DEGREES, STEP_NS
 from ahv_plant.model.vectors import Rates, State, Surfaces
 from ahv_plant.termination import Termination
 
+NOT_ALL_RECORDED = "not_all_recorded"  # what would be a success, if the record showed all of it
 
-def summarize(record: FlightRecord, ended_early: str, control: FlightControl) -> dict[str, Any]:
+
+def missing_states(bag: Bag, steps: int) -> int:
+    """How many of the states 0 to `steps` a bag lacks: what was flown, and is not in the record.
+
+    In real time a step may lack a command, which came too late or never; a state is never missing.
+    """
+    stamps, _, _ = STATE.layout.decode_all(bag.topics[STATE.name].messages)
+    of_flight = (stamps % STEP_NS == 0) & (stamps >= 0) & (stamps <= steps * STEP_NS)
+    return steps + 1 - len(np.unique(stamps[of_flight]))
+
+
+def summarize(
+    record: FlightRecord, ended_early: str, control: FlightControl, missing: int = 0
+) -> dict[str, Any]:
     """Verdict, extremes and end of a flight under the settings `control`.
 
-    `ended_early` says why it ended too soon, if so. Success is that of a campaign, and of Table
-    5.1: flown to the end with |alpha| <= 5 deg throughout and surfaces that turn the vehicle.
+    `ended_early` says why it ended too soon, if so; `missing` how many states are not recorded.
+    Success is that of a campaign, and of Table 5.1: flown to the end with |alpha| <= 5 deg
+    throughout and surfaces that turn the vehicle; and the record has to show all of that.
     """
     surfaces = record.surfaces * DEGREES
     angles = margins(record)
-    cause = failure(record, ended_early, control)
+    cause = failure(record, ended_early, control).name.lower()
+    if cause == Cause.SUCCESS.name.lower() and missing:
+        cause = NOT_ALL_RECORDED
     return {
         "steps": record.steps,
-        "success": cause == Cause.SUCCESS,
-        "cause": cause.name.lower(),
+        "missing_steps": missing,
+        "success": cause == Cause.SUCCESS.name.lower(),
+        "cause": cause,
         "ended_early": ended_early,
         "max_abs_alpha_deg": angles["alpha"].largest_deg,
         "max_abs_beta_deg": angles["beta"].largest_deg,

@@ -24,7 +24,7 @@ from ahv_msgs_py.node.real_time import reserve_memory
 from ahv_msgs_py.node.subscription import Listener, gids
 from ahv_msgs_py.node.synchronizer import Fallback, RealTimeSteps, Stepwise, Values
 from ahv_msgs_py.parameters import Parameter, Value
-from ahv_msgs_py.topics import DIAGNOSTICS, QUEUE_DEPTH, STATE, LoopTopic, relative
+from ahv_msgs_py.topics import DIAGNOSTICS, FLIGHT, FLYING, QUEUE_DEPTH, STATE, LoopTopic, relative
 
 STATE_LOST_AFTER = 500_000_000  # [ns]
 
@@ -46,6 +46,7 @@ class BaseNode(ManagedNode):
         self.health = Health(time.monotonic_ns)
         self._state_heard = 0  # [ns] by the steady clock
         self._state_lost = False
+        self._flight_over = False  # the plant has told the end of the flight
         self.heard: dict[LoopTopic, Guard] = {}  # what the node listens to of the loop
         self._diagnostics = self.create_publisher(
             DiagnosticArray, DIAGNOSTICS.name, quality(True, self.sender_depth)
@@ -105,7 +106,8 @@ class BaseNode(ManagedNode):
         Values that no receiver would take are not sent, and counted.
         """
         encode = topic.layout.encode
-        qos = quality(durable=not self.realtime, depth=self.sender_depth)
+        durable = not self.realtime or topic is FLIGHT  # it is told to who comes later too
+        qos = quality(durable, self.sender_depth)
         publish = self.publisher(topic.layout.type_name, topic.name, qos, matched).publish
         name = self.full_name(topic)
         low = min(low for low, _ in topic.bounds)
@@ -124,9 +126,8 @@ class BaseNode(ManagedNode):
         message_type = message_class(topic.layout.type_name)
         name = self.full_name(topic)
         publishers = partial(gids, self, name)
-        guard = Guard(
-            topic, general_reader(topic.layout), time.monotonic_ns, self.realtime, publishers
-        )
+        hurry = self.realtime and topic is not FLIGHT  # of which there is one message a second
+        guard = Guard(topic, general_reader(topic.layout), time.monotonic_ns, hurry, publishers)
         self.heard[topic] = guard
         judge = guard.read
         paces = topic is STATE
@@ -141,15 +142,22 @@ class BaseNode(ManagedNode):
                 self._state_came(stamp, guard)
             handle(stamp, values)
 
-        listener = Listener(self, message_type, relative(topic.name), self.loop_quality(), read)
+        qos = self.loop_quality() if topic is not FLIGHT else quality(True)
+        listener = Listener(self, message_type, relative(topic.name), qos, read)
         self._opened.append(listener.close)
+        if paces and self.realtime:
+            self.receive(FLIGHT, self._flight_told)
+
+    def _flight_told(self, stamp: int, values: Values) -> None:
+        """Learn that the flight is over: from then on no state is missed."""
+        self._flight_over = values[-1] != FLYING
 
     def _state_came(self, stamp: int, guard: Guard) -> None:
         """Keep the time of the flight; a stamp that goes back starts a new one."""
         self.health.state_came()
         if self.realtime:
             self._state_heard = time.monotonic_ns()
-            self._state_lost = False
+            self._state_lost = self._flight_over = False
         if self.now is not None and stamp <= self.now:
             for other in self.heard.values():
                 if other is not guard:
@@ -227,7 +235,8 @@ class BaseNode(ManagedNode):
     def _watch(self) -> None:
         """Once a second in real time: look for a state that has gone, report, tidy up."""
         silent = time.monotonic_ns() - self._state_heard
-        if self._state_heard and silent > STATE_LOST_AFTER and not self._state_lost:
+        missed = self._state_heard and silent > STATE_LOST_AFTER and not self._flight_over
+        if missed and not self._state_lost:
             self._state_lost = True
             self.fault(self.now or 0, Fault.STATE_LOST, f"none for {silent * 1e-9:.1f} s")
         self.report_health(self.now or 0)

@@ -153,7 +153,7 @@ class Fault(Enum):
     )
     LISTENER_LOST = Response(
         "plant",
-        "fewer subscribers of the state than the flight started with: a node or recorder ended",
+        "a node that listened to the state does so no more: it ended, or was deactivated",
         "the flight goes on; the bag of a killed recorder can be recovered",
         "at once if it ended, up to 20 s if it was killed",
     )

@@ -17,7 +17,7 @@ from rclpy.type_support import check_is_valid_msg_type
 from rclpy.waitable import NumberOfEntities, Waitable
 
 GID_SIZE = 16  # [bytes] RMW_GID_STORAGE_SIZE
-Taken = tuple[bytes, bytes]  # a message as CDR, and the GID of its publisher
+Taken = tuple[bytes, bytes, int]  # a message as CDR, GID of its publisher, its number there
 
 
 class _Allocator(ctypes.Structure):
@@ -94,7 +94,8 @@ class Subscription:
                 raise RuntimeError(f"{self._name}: messages cannot be taken: code {code} of rcl")
             return None
         message = self._message
-        return ctypes.string_at(message.buffer, message.length), self._gid.tobytes()
+        data = ctypes.string_at(message.buffer, message.length)
+        return data, self._gid.tobytes(), self._info.publication_sequence_number
 
     def __iter__(self) -> Iterator[Taken]:
         """All messages that have come, in their order."""
@@ -159,7 +160,8 @@ class Listener(Waitable):
         """Take a message and hand it on at once: a step later, the topic may have been closed."""
         taken = self._subscription.take()
         if taken is not None:
-            self._heard(*taken)
+            data, publisher, _ = taken
+            self._heard(data, publisher)
 
     async def execute(self, data: None) -> None:
         """Nothing is left to do."""
