@@ -26,7 +26,7 @@ from ahv_analysis.command.console import (
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.interrupt import interrupted_says, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
-from ahv_plant.model.constants import STEP
+from ahv_plant.model.constants import STEP, STEP_NS
 
 
 class CaseCommand(TyperCommand):
@@ -176,6 +176,8 @@ def _print_summary(summary: dict[str, Any]) -> None:
     verdict = "success" if summary["success"] else "FAILURE"
     cause = "" if summary["success"] else summary["cause"].replace("_", " ")
     why = cause, summary["ended_early"] or "flown to its end"
+    missing = summary["missing_steps"]
+    unrecorded = f", and {missing} that are not in the bag" if missing else ""
     rows = [
         ("verdict", f"{verdict}: {', '.join(filter(None, why))}"),
         ("largest |alpha|", f"{summary['max_abs_alpha_deg']:.3f} deg (inlet unstart at 5 deg)"),
@@ -185,8 +187,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
         ("fuel", f"{summary['fuel_kg']:.0f} kg"),
         ("final speed u", f"{final['u']:.2f} m/s"),
         ("final altitude", f"{final['h']:.1f} m"),
-        ("not recorded", f"{summary['missing_steps']} steps"),
-        ("flown", f"{summary['steps']} steps in {summary['wall_s']:.2f} s"),
+        ("flown", f"{summary['steps']} steps in {summary['wall_s']:.2f} s{unrecorded}"),
         ("pace", f"{summary['real_time_factor']:.0f} times real time"),
         ("bag", summary["bag"]),
     ]
