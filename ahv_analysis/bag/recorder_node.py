@@ -40,7 +40,6 @@ RECORDER_PARAMETERS = (
         f"{CONTINUE} lets them go on without a record",
     ),
 )
-PLANT = f"{NAMESPACE}/plant"  # who says that the flight is over
 POLL = 0.02  # [s] of wall time between looks at the topics
 POLLS = 5  # looks that a chunk has the messages of
 QUIET = 0.5  # [s] after the end of a flight in real time, for what is still under way

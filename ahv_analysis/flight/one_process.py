@@ -94,6 +94,8 @@ def _fly_graph(
         wall = time.perf_counter() - started
         if interrupted():
             return INTERRUPTED, wall
+        if plant.now is None:  # it has sent no state
+            raise GraphError(plant.finished.result())
         if plant.count_publishers(plant.full_name(STATE)) > 1:
             raise GraphError(
                 f"another plant flew in the namespace {namespace} of this ROS domain: "
