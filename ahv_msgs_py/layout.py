@@ -68,6 +68,7 @@ class Layout:
         )
         self._constant = constant
         self._end = end
+        self.size = self._struct.size  # [bytes] of a message
 
     def encode(self, stamp: int, values: Sequence[float]) -> bytes:
         """The message at `stamp` [ns] as CDR bytes."""
@@ -78,29 +79,26 @@ class Layout:
 
     def decode(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
         """Stamp [ns] and values of CDR bytes; None if they are not of exactly this layout."""
-        if len(data) != self._struct.size:
+        if len(data) != self.size:
             return None
         head, seconds, nanoseconds, constant, *values, end = self._struct.unpack(data)
         if head != _ENCAPSULATION or constant != self._constant or end != self._end:
             return None
         return seconds * NANOSECONDS + nanoseconds, tuple(values)
 
-    def decode_all(
-        self, messages: Sequence[bytes]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.intp]]:
-        """Stamps (n,) [ns] and values (n, fields) of the messages of exactly this layout.
+    def decode_rows(
+        self, rows: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Stamps (n,) [ns] and values (n, fields) of messages (n, `size`) of the layout's size.
 
-        The third array (n,) are their places in `messages`; those of another layout are left out.
+        The third array (n,) is which of them are of exactly this layout; the others mean nothing.
         """
-        size = self._struct.size
-        fits = [place for place, data in enumerate(messages) if len(data) == size]
-        rows = np.frombuffer(b"".join(messages[place] for place in fits), self._rows)
-        known = rows["head"] == np.void(_ENCAPSULATION)
-        known &= rows["constant"] == np.void(self._constant)
-        known &= rows["end"] == np.void(self._end)
-        rows = rows[known]
-        stamps = rows["seconds"].astype(np.int64) * NANOSECONDS + rows["nanoseconds"]
-        return stamps, np.array(rows["values"]), np.array(fits, np.intp)[known]
+        fields = np.ascontiguousarray(rows).view(self._rows)[:, 0]
+        known = fields["head"] == np.void(_ENCAPSULATION)
+        known &= fields["constant"] == np.void(self._constant)
+        known &= fields["end"] == np.void(self._end)
+        stamps = fields["seconds"].astype(np.int64) * NANOSECONDS + fields["nanoseconds"]
+        return stamps, np.array(fields["values"]).reshape(len(rows), len(self.fields)), known
 
     def values_of(self, message: Any) -> tuple[int, tuple[float, ...]]:
         """Stamp [ns] and values of a message object of this type; MessageError if unfit."""

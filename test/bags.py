@@ -99,7 +99,7 @@ def one_topic_only(path, whole):
 
 def without_a_topic(path, whole):
     bag = BagWriter(path)
-    for name, topic in load_bag(whole).topics.items():
+    for name, topic in load_bag(whole).items():
         if name != STATE.name:
             bag.write(name, *topic.messages)
     bag.close()
@@ -130,7 +130,7 @@ def stock(path, whole, compression=CompressionType.NONE, use_chunking=True, file
     """
     path.mkdir()
     store = get_typestore(Stores.ROS2_JAZZY)
-    topics = [(name, topic) for name, topic in load_bag(whole).topics.items() if topic.messages]
+    topics = [(name, topic) for name, topic in load_bag(whole).items() if topic.messages]
     names = [f"{path.name}_{number}.mcap" for number in range(files)]
     for number, name in enumerate(names):
         with open(path / name, "wb") as sink:

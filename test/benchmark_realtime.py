@@ -89,7 +89,7 @@ def bench_realtime(seconds: int) -> None:
             wall, taken = time.perf_counter() - started, stolen() - taken
             watcher.look(LOOK)  # what the plant said last
             misses.look()
-        states = len(load_bag(bag).topics[STATE.name].messages)
+        states = len(load_bag(bag)[STATE.name].messages)
     facts = watcher.over
     watcher.close()
     share = {name: (used[name] - before[name]) / wall for name in used}

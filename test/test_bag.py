@@ -12,12 +12,13 @@ from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from ahv_analysis.bag.reader import load_bag, read_bag, read_notes
+from ahv_analysis.bag.reader import flight_of, load_bag, read, read_bag
 from ahv_analysis.bag.record import record
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly, fly_library
+from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.topics import CLOCK, LOOP_TOPICS, NOMINAL_TOPICS, STATE
 from test.bags import DAMAGES, mcap_of, stock
 from test.test_messages import message_of
@@ -48,14 +49,14 @@ def test_the_bag_knows_which_altitude_was_flown(tmp_path):
 def test_messages_of_another_sender_are_read(tmp_path):
     bag = BagWriter(tmp_path / "bag")
     for topic in LOOP_TOPICS:
-        values = tuple(float(number) for number in range(len(topic.layout.fields)))
+        values = SAFE[topic]
         message = message_of(topic, 70_000_000, values)
         message.header.frame_id = ""
         bag.write(topic.name, serialize_message(message))
     bag.close()
     flown = read_bag(tmp_path / "bag")
     assert flown.stamps.tolist() == [70_000_000]
-    assert flown.states.tolist() == [[float(number) for number in range(13)]]
+    assert flown.states.tolist() == [SAFE[STATE]]
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -77,7 +78,7 @@ def test_a_bag_of_stock_rosbag2_is_read(tmp_path, whole, compression, use_chunki
     assert flown.stamps.tolist() == ours.stamps.tolist()
     assert flown.states.tobytes() == ours.states.tobytes()
     assert flown.throttle.tobytes() == ours.throttle.tobytes()
-    assert read_notes(tmp_path / "stock") is None
+    assert read(tmp_path / "stock").notes is None
 
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
@@ -85,7 +86,7 @@ def test_a_bag_that_rosbag2_compressed_is_read(tmp_path, whole, mode):
     writer = Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(mode, CompressionFormat.ZSTD)
     with writer:
-        for name, topic in load_bag(whole).topics.items():
+        for name, topic in load_bag(whole).items():
             link = writer.add_connection(
                 name, topic.type_name, typestore=get_typestore(Stores.ROS2_JAZZY)
             )
@@ -101,13 +102,15 @@ def test_a_bag_stored_otherwise_is_named(tmp_path):
         read_bag(tmp_path / "bag")
 
 
+SAFE = {topic: [max(low, min(1.0, high)) for low, high in topic.bounds] for topic in LOOP_TOPICS}
+
+
 def two_states(path, differ):
-    """A bag with one step and its state twice."""
+    """A bag with one step and its state twice, without the number of a publisher."""
     bag = BagWriter(path)
     for topic in NOMINAL_TOPICS:
-        values = [1.0] * len(topic.layout.fields)
-        bag.write(topic.name, topic.layout.encode(0, values))
-    bag.write(STATE.name, STATE.layout.encode(0, [1.0 + differ] * 13))
+        bag.write(topic.name, topic.layout.encode(0, SAFE[topic]), publishers=[0])
+    bag.write(STATE.name, STATE.layout.encode(0, [1.0 + differ] * 13), publishers=[0])
     bag.close()
     return path
 
@@ -122,26 +125,29 @@ def test_a_bag_of_two_flights_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("data", [b"", b"abc", bytes(200), b"\x00\x01\x00\x00" + bytes(range(90))])
-def test_a_message_that_is_none_is_named(tmp_path, data):
+def test_a_message_that_is_none_is_left_out_as_receivers_do_and_counted(tmp_path, data):
     bag = BagWriter(tmp_path / "bag")
     for topic in NOMINAL_TOPICS:
-        bag.write(topic.name, topic.layout.encode(0, [1.0] * len(topic.layout.fields)))
+        bag.write(topic.name, topic.layout.encode(0, SAFE[topic]))
     bag.write(STATE.name, data)
     bag.close()
-    with pytest.raises(BagError, match="bag: /ahv/state: "):
-        read_bag(tmp_path / "bag")
+    held = read(tmp_path / "bag")
+    assert flight_of(held).states.tolist() == [SAFE[STATE]]
+    (refused,) = held.refused
+    assert (refused.topic, refused.fault, refused.messages) == (STATE.name, Fault.MALFORMED, 1)
 
 
-def test_without_ros_a_message_of_another_sender_is_named(tmp_path, monkeypatch):
+def test_a_message_of_another_sender_is_read_without_ros(tmp_path, monkeypatch):
     path = two_states(tmp_path / "bag", 0.0)
-    monkeypatch.setattr("ahv_analysis.bag.reader.STATE.layout.decode_all", no_message_fits)
+    monkeypatch.setattr("ahv_analysis.bag.reader.STATE.layout.decode", lambda data: None)
+    monkeypatch.setattr("ahv_analysis.bag.reader.STATE.layout.decode_rows", no_message_fits)
     monkeypatch.setitem(sys.modules, "rclpy", None)
-    with pytest.raises(BagError, match="which only ROS can read"):
-        read_bag(path)
+    assert read_bag(path).states.tolist() == [SAFE[STATE]]
 
 
-def no_message_fits(messages):
-    return np.empty(0, np.int64), np.empty((0, 13)), np.empty(0, np.intp)
+def no_message_fits(rows):
+    count = len(rows)
+    return np.zeros(count, np.int64), np.zeros((count, 13)), np.zeros(count, bool)
 
 
 def test_a_topic_of_another_type_is_named(tmp_path, whole):

@@ -9,7 +9,7 @@ from mcap.writer import CompressionType
 from rosbags.rosbag2 import Reader
 
 from ahv_analysis.bag.info import bag_info
-from ahv_analysis.bag.reader import load_bag, read_bag, read_notes
+from ahv_analysis.bag.reader import load_bag, read, read_bag
 from ahv_analysis.bag.recovery import recover
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
@@ -50,7 +50,7 @@ def contents(folder):
 
 
 def messages(bag):
-    return {name: topic.messages for name, topic in load_bag(bag).topics.items()}
+    return {name: topic.messages for name, topic in load_bag(bag).items()}
 
 
 @pytest.mark.parametrize("damage", [without_metadata, nonsense_metadata, cut_short])
@@ -61,7 +61,7 @@ def test_a_bag_without_its_metadata_or_index_loses_nothing(tmp_path, whole, dama
     assert contents(tmp_path / "bag") == before
     assert messages(tmp_path / "new") == messages(whole)
     assert recovery.losses and recovery.messages == sum(map(len, messages(whole).values()))
-    assert read_notes(tmp_path / "new") == read_notes(whole)
+    assert read(tmp_path / "new").notes == read(whole).notes
     if damage is not cut_short:  # the index says how many there were
         assert recovery.lost_messages == 0 and bag_info(tmp_path / "new")["complete"]
 
@@ -74,7 +74,7 @@ def test_a_bag_that_was_cut_in_flight_keeps_its_beginning(tmp_path, whole):
     assert STEPS / 2 < kept.steps < STEPS
     assert kept.stamps.tolist() == flown.stamps[: kept.steps + 1].tolist()
     assert kept.states.tobytes() == flown.states[: kept.steps + 1].tobytes()
-    assert read_notes(tmp_path / "new")["case"] == "nominal_di"
+    assert read(tmp_path / "new").notes.case == "nominal_di"
     assert not bag_info(tmp_path / "new")["complete"]
 
 
@@ -180,4 +180,4 @@ def test_a_recovery_can_be_recovered(tmp_path, whole):
     (tmp_path / "once" / "metadata.yaml").unlink()
     recover(tmp_path / "once", tmp_path / "twice")
     assert messages(tmp_path / "twice") == once
-    assert read_notes(tmp_path / "twice") == read_notes(whole)
+    assert read(tmp_path / "twice").notes == read(whole).notes

@@ -13,7 +13,9 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from ahv_analysis.bag.mcap_file import McapFile
-from ahv_analysis.bag.mcap_scan import HEAD, Block, Damage, scan
+from ahv_analysis.bag.mcap_scan import Block, Damage
+from ahv_analysis.bag.mcap_scan import scan as scan_file
+from ahv_analysis.bag.plain_file import PlainFile
 
 pytestmark = pytest.mark.unit
 
@@ -57,12 +59,25 @@ def of_mcap(compression, **options):
     return sink.getvalue()
 
 
+@pytest.fixture(scope="module", autouse=True)
+def scratch(tmp_path_factory):
+    """Where `scan` puts its file."""
+    global SCRATCH
+    SCRATCH = tmp_path_factory.mktemp("scan") / "scanned.mcap"
+
+
+def scan(data):
+    SCRATCH.write_bytes(data)
+    with PlainFile(SCRATCH) as file:
+        yield from scan_file(file)
+
+
 def bodies(pieces):
     return [
-        piece.records[start + HEAD : end]
+        piece.body(place)
         for piece in pieces
         if isinstance(piece, Block)
-        for _, _, start, end in piece.messages
+        for place in range(len(piece.starts))
     ]
 
 

@@ -3,6 +3,7 @@
 
 import struct
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -89,9 +90,11 @@ def test_many_messages_are_read_as_one_by_one(topic):
     sent = [(stamp, tuple(0.1 * stamp + i for i in range(size))) for stamp in (0, 7, 10**10)]
     data = [topic.layout.encode(*message) for message in sent]
     spoilt = bytes([data[0][0] ^ 1]) + data[0][1:]
-    stamps, values, places = topic.layout.decode_all([data[0], b"", spoilt, *data[1:]])
-    assert list(zip(stamps.tolist(), map(tuple, values.tolist()), strict=True)) == sent
-    assert places.tolist() == [0, 3, 4]
+    rows = np.frombuffer(data[0] + spoilt + data[1] + data[2], np.uint8)
+    stamps, values, known = topic.layout.decode_rows(rows.reshape(4, topic.layout.size))
+    read = zip(stamps[known].tolist(), map(tuple, values[known].tolist()), strict=True)
+    assert list(read) == sent
+    assert known.tolist() == [True, False, True, True]
 
 
 @TOPICS

@@ -5,14 +5,15 @@ import io
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pyarrow
 import pyarrow.csv
 import pyarrow.parquet
 import xarray
 
-from ahv_analysis.bag.reader import flight_of, load_bag, notes_of
+from ahv_analysis.bag.notes import Notes
+from ahv_analysis.bag.reader import flight_of, read
 from ahv_analysis.bag.record import Array, FlightRecord
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
@@ -133,12 +134,13 @@ AIR_SIGNALS = (
 
 
 def bag_dataset(path: Path) -> xarray.Dataset:
-    """The flight in the bag folder `path` as `flight_dataset` gives it; BagError if it is none."""
-    bag = load_bag(path)
-    return flight_dataset(flight_of(bag), notes_of(bag.metadata))
+    """The flight in the bag `path` as `flight_dataset` gives it; BagError if it is none."""
+    bag = read(path)
+    flight = flight_dataset(flight_of(bag), bag.notes)
+    return flight.assign_attrs(refused=sum(entry.messages for entry in bag.refused))
 
 
-def flight_dataset(record: FlightRecord, notes: Mapping[str, Any] | None) -> xarray.Dataset:
+def flight_dataset(record: FlightRecord, notes: Notes | None) -> xarray.Dataset:
     """Signals of a flight over `time` [s], each with units, frame, long_name and source.
 
     The states, the commands that answer them and, of an adaptive flight, what the learner knows,
@@ -170,7 +172,7 @@ def flight_dataset(record: FlightRecord, notes: Mapping[str, Any] | None) -> xar
     time = ("time", record.time, {"units": "s", "long_name": "simulated time"})
     attributes = {"title": "flight of ahv", "altitude": altitude}
     if notes is not None:
-        attributes |= {"case": notes["case"], "notes": json.dumps(notes)}
+        attributes |= {"case": notes.case, "notes": json.dumps(notes.content)}
     return xarray.Dataset(variables, {"time": time}, attributes)
 
 
@@ -192,7 +194,9 @@ def _table(flight: xarray.Dataset, named: Callable[[str, str], str]) -> pyarrow.
         )
         for column in columns
     ]
-    schema = pyarrow.schema(fields, metadata=flight.attrs)
+    schema = pyarrow.schema(
+        fields, metadata={key: str(value) for key, value in flight.attrs.items()}
+    )
     return pyarrow.table([column.values for column in columns], schema)
 
 

@@ -1,45 +1,56 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """What a bag holds, in a few facts."""
 
-import json
 from pathlib import Path
 from typing import Any
 
-from ahv_analysis.bag.reader import flight_of, load_bag, notes_of
-from ahv_analysis.bag.recovery import RECOVERED
+from ahv_analysis.bag.notes import read_losses
+from ahv_analysis.bag.reader import Bag, flight_of, read
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_plant.model.constants import STEP_NS
 
 
 def bag_info(path: Path) -> dict[str, Any]:
-    """Facts of the flight in the bag folder `path`; BagError if it is damaged or no flight.
+    """Facts of the flight in the bag `path`; BagError if it is damaged or no flight.
 
     `complete` is whether every step of the flight is there, from the first one on, and nothing was
     lost before a recovery. `case`, `planned_s` and `notes` are None in a bag without notes.
     """
-    bag = load_bag(path)
+    bag = read(path)
     flight = flight_of(bag)
-    notes = notes_of(bag.metadata)
     first, last = int(flight.stamps[0]), int(flight.stamps[-1])
     missing = last // STEP_NS + 1 - len(flight.stamps)
-    text = (bag.metadata.get("custom_data") or {}).get(RECOVERED)
-    recovered = None if text is None else json.loads(text)
+    recovered = read_losses(bag.custom)
     whole = recovered is None or recovered["lost_messages"] == 0
-    files = [path / name for name in bag.metadata["relative_file_paths"]]
     return {
-        "bag": str(path),
+        "bag": str(bag.path),
         "complete": missing == 0 and whole,
-        "case": notes and notes["case"],
+        "case": bag.notes and bag.notes.case,
         "duration_s": (last - first) / NANOSECONDS,
-        "planned_s": notes and notes["parameters"]["plant"]["duration"],
+        "planned_s": bag.notes and bag.notes.planned,
         "steps": flight.steps,
         "missing_steps": missing,
+        "refused": refused_facts(bag),
         "recovered": recovered,
-        "bytes": sum(file.stat().st_size for file in files),
-        "messages": sum(len(topic.messages) for topic in bag.topics.values()),
+        "bytes": bag.bytes,
+        "messages": sum(topic.messages for topic in bag.topics.values()),
         "topics": [
-            {"name": name, "type": topic.type_name, "messages": len(topic.messages)}
+            {"name": name, "type": topic.type_name, "messages": topic.messages}
             for name, topic in bag.topics.items()
         ],
-        "notes": notes,
+        "notes": bag.notes and bag.notes.content,
     }
+
+
+def refused_facts(bag: Bag) -> list[dict[str, Any]]:
+    """What no receiver obeyed, for JSON."""
+    return [entry._asdict() | {"fault": entry.fault.name.lower()} for entry in bag.refused]
+
+
+def refused_words(refused: list[dict[str, Any]]) -> str:
+    """The same in one line."""
+    return "; ".join(
+        f"{entry['messages']} on {entry['topic']}: {entry['fault'].replace('_', ' ')}, "
+        f"first {entry['first']}"
+        for entry in refused
+    )

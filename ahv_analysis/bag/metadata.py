@@ -11,16 +11,30 @@ from rosbags.rosbag2.errors import ReaderError
 from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 
 from ahv_analysis.bag.mcap_file import Contents
+from ahv_analysis.bag.plain_file import read_text
 from ahv_analysis.errors import BagError
+from ahv_msgs_py.layout import excerpt
 
 METADATA_FILE = "metadata.yaml"
 VERSION = 9  # of the metadata, as Jazzy writes it
 DISTRO = "jazzy"
 RECORD = "rosbag2"  # name of the metadata record of an MCAP file, and its key
 _YamlLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_YamlDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+LARGEST = 2**22  # [bytes] of metadata as text
+LONGEST_NAME = 255  # [bytes] of a file
+MOST_NODES, DEEPEST = 200_000, 30  # of YAML: more than a thousand topics and files have
 _TEXT = "serialized_metadata"
 NOTES = "ahv"  # key of the notes of a flight in the custom data
 QOS_KEY, HASH_KEY = "offered_qos_profiles", "topic_type_hash"  # of a channel's metadata
+
+
+class BagMetadata(NamedTuple):
+    """What of the metadata of a bag is read."""
+
+    files: list[str]  # as they lie in the folder
+    messages: int | None  # None if that is not said
+    custom: dict[str, str]  # texts by their keys
 
 
 class Topic(NamedTuple):
@@ -30,19 +44,21 @@ class Topic(NamedTuple):
     type_name: str
     qos: str  # profiles offered, as YAML
     type_hash: str
+    encoding: str = "cdr"
 
     @classmethod
-    def of(cls, channel: Channel, schema: Schema) -> "Topic":
-        """Topic of an MCAP channel."""
+    def of(cls, channel: Channel, schema: Schema | None) -> "Topic":
+        """Topic of an MCAP channel, whose messages may have no schema."""
         qos, type_hash = (channel.metadata.get(key, "") for key in (QOS_KEY, HASH_KEY))
-        return cls(channel.topic, schema.name, qos, type_hash)
+        type_name = "" if schema is None else schema.name
+        return cls(channel.topic, type_name, qos, type_hash, channel.message_encoding)
 
     def channel(self, number: int, schema: int) -> Channel:
         """The topic as channel `number` of an MCAP file."""
         return Channel(
             id=number,
             topic=self.name,
-            message_encoding="cdr",
+            message_encoding=self.encoding,
             metadata={QOS_KEY: self.qos, HASH_KEY: self.type_hash},
             schema_id=schema,
         )
@@ -76,7 +92,7 @@ def bag_metadata(files: Sequence[BagFile], custom: Mapping[str, str]) -> dict[st
                 "topic_metadata": {
                     "name": topic.name,
                     "type": topic.type_name,
-                    "serialization_format": "cdr",
+                    "serialization_format": topic.encoding,
                     "offered_qos_profiles": _profiles(topic.qos),
                     "type_description_hash": topic.type_hash,
                 },
@@ -104,9 +120,39 @@ def bag_metadata(files: Sequence[BagFile], custom: Mapping[str, str]) -> dict[st
 def _profiles(qos: str) -> list[Any]:
     """Quality of service of a channel as metadata.yaml has it; nothing of what nobody can read."""
     try:
-        return list(dump_qos_v9(parse_qos(qos)))
+        profiles = load_yaml(qos)
+        return list(dump_qos_v9(parse_qos(profiles))) if isinstance(profiles, list) else []
     except (ReaderError, KeyError, TypeError, ValueError, AttributeError):
         return []
+
+
+def load_yaml(text: str) -> Any:
+    """Content of YAML from outside; ValueError if it is none, or more than metadata can be.
+
+    An alias counts as what it stands for, by which a few lines come to gigabytes.
+    """
+    nodes = 0
+    sizes: dict[str, int] = {}  # nodes by anchor
+    opened: list[tuple[str | None, int]] = []  # anchors of the collections around, nodes before
+    try:
+        for event in yaml.parse(text, _YamlLoader):
+            if isinstance(event, yaml.AliasEvent):
+                if event.anchor not in sizes:
+                    raise ValueError("it has a YAML alias of what is around it, or of nothing")
+                nodes += sizes[event.anchor]
+            elif isinstance(event, yaml.CollectionStartEvent):
+                opened.append((event.anchor, nodes))
+            elif isinstance(event, yaml.CollectionEndEvent):
+                anchor, before = opened.pop()
+                sizes |= {anchor: nodes - before} if anchor else {}
+            elif isinstance(event, yaml.ScalarEvent) and event.anchor:
+                sizes[event.anchor] = 1
+            nodes += 1
+            if nodes > MOST_NODES or len(opened) > DEEPEST:
+                raise ValueError("it is too large or too deep")
+        return yaml.load(text, _YamlLoader)
+    except (yaml.YAMLError, OverflowError) as error:
+        raise ValueError(" ".join(str(error).split())) from error
 
 
 def metadata_record(metadata: Mapping[str, Any]) -> Metadata:
@@ -117,42 +163,46 @@ def metadata_record(metadata: Mapping[str, Any]) -> Metadata:
 def custom_of_record(record: Metadata) -> dict[str, str]:
     """Texts of ours in such a record; none where another program wrote it, or nothing."""
     try:
-        return dict(yaml.load(record.metadata[_TEXT], _YamlLoader)["custom_data"] or {})
-    except (yaml.YAMLError, KeyError, TypeError, ValueError):
+        content = load_yaml(record.metadata[_TEXT])
+    except (KeyError, ValueError):
         return {}
+    return _custom(content) if isinstance(content, dict) else {}
 
 
-def read_metadata(path: Path) -> dict[str, Any]:
-    """Contents of metadata.yaml of the bag folder `path`; BagError if they do not fit.
+def _custom(metadata: dict[Any, Any]) -> dict[str, str]:
+    """Whatever stands in `custom_data` as a text under a text; the rest is of no known use."""
+    custom = metadata.get("custom_data")
+    pairs = custom.items() if isinstance(custom, dict) else ()
+    return {key: text for key, text in pairs if isinstance(key, str) and isinstance(text, str)}
 
-    The files of the bag are named as they lie in the folder.
-    """
-    file = path / METADATA_FILE
-    if not file.is_file():
-        if any(path.glob("*.mcap")):
-            raise BagError(
-                f"{path} has no {METADATA_FILE}, so its recorder was stopped before the end; "
-                f"`ahv bag recover {path}` gives what it has"
-            )
-        raise BagError(f"{path} is not a bag: a bag is a folder with a {METADATA_FILE}")
+
+def read_metadata(folder: Path) -> BagMetadata:
+    """Read metadata.yaml of a bag folder; BagError if there is none, or it does not fit."""
+    file = folder / METADATA_FILE
     try:
-        content = yaml.load(file.read_text(encoding="utf-8"), _YamlLoader)
-        metadata: dict[str, Any] = content["rosbag2_bagfile_information"]
-        storage = metadata["storage_identifier"]
-        metadata["relative_file_paths"] = [
-            Path(name).name for name in metadata["relative_file_paths"]
-        ]
-    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise BagError(f"{file} is not the metadata of a bag: {reason}") from error
-    if storage != "mcap":
-        raise BagError(f"{path} is stored as {storage!r}, but must be 'mcap'")
-    return metadata
-
-
-def missing_files(path: Path, metadata: Mapping[str, Any]) -> list[str]:
-    """Files of the bag folder `path` that its metadata names and that are not there."""
-    return [name for name in metadata["relative_file_paths"] if not (path / name).is_file()]
+        content = load_yaml(read_text(file, LARGEST))
+    except ValueError as error:
+        raise BagError(f"{file} is not the metadata of a bag: {error}") from error
+    metadata = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
+    if not isinstance(metadata, dict):
+        raise BagError(f"{file} is not the metadata of a bag: it has no section of rosbag2")
+    names = metadata.get("relative_file_paths")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise BagError(f"{file}: relative_file_paths must be a list of names")
+    files = [Path(name).name for name in names]
+    for name in files:
+        if not name.isprintable() or len(name.encode()) > LONGEST_NAME:
+            raise BagError(f"{file}: {excerpt(name)} is no name of a file")
+    if len(set(files)) < len(files):
+        raise BagError(f"{file}: relative_file_paths names a file twice")
+    storage = metadata.get("storage_identifier")
+    # rosbag2 leaves it empty where it was told nothing, and then goes by the files
+    mcap = not storage and all(".mcap" in Path(name).suffixes for name in files)
+    if not (storage == "mcap" or mcap):
+        raise BagError(f"{folder} is stored as {excerpt(str(storage))}, but must be 'mcap'")
+    count = metadata.get("message_count")
+    messages = count if isinstance(count, int) and count >= 0 else None
+    return BagMetadata(files, messages, _custom(metadata))
 
 
 def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:
@@ -168,4 +218,5 @@ def qos_text(profiles: Sequence[Any]) -> str:
 
 
 def _text(content: object) -> str:
-    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    text: str = yaml.dump(content, Dumper=_YamlDumper, sort_keys=False, allow_unicode=True)
+    return text

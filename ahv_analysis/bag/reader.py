@@ -1,20 +1,25 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Reading a bag back as arrays: ours, or any that rosbag2 recorded as MCAP."""
 
-import json
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from struct import error as StructError
+from typing import NamedTuple
 
 import numpy as np
-import zstandard
-from mcap.records import Channel, Schema
+from mcap.records import Channel, Metadata, Schema
 from numpy.typing import NDArray
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_typestore
 
-from ahv_analysis.bag.mcap_scan import HEAD, Block, Damage, Piece, scan
-from ahv_analysis.bag.metadata import NOTES, missing_files, read_metadata
-from ahv_analysis.bag.record import Array, FlightRecord
+from ahv_analysis.bag.files import bag_files
+from ahv_analysis.bag.mcap_scan import HEAD, Block, Damage, scan
+from ahv_analysis.bag.metadata import custom_of_record
+from ahv_analysis.bag.notes import Notes, read_notes
+from ahv_analysis.bag.plain_file import ZSTD_MAGIC, PlainFile, UnpackError
+from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.series import AmbiguousError, Collector, Refused, Series
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.topics import (
@@ -30,130 +35,235 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
     LoopTopic,
-    ViewerTopic,
     relative,
     within,
 )
 
+_STORE = get_typestore(Stores.ROS2_JAZZY)
+_LOOP = {relative(topic.name): topic for topic in LOOP_TOPICS}
 
-class Recorded(NamedTuple):
-    """A topic of a bag, its messages in the order of the file."""
+
+class Held(NamedTuple):
+    """A topic of a bag."""
 
     type_name: str
-    log_times: list[int]  # [ns] simulated time in our bags, time of arrival in those of rosbag2
-    messages: list[bytes]  # CDR
+    messages: int
 
 
 class Bag(NamedTuple):
     """What a bag holds, every checksum found right."""
 
     path: Path
-    metadata: dict[str, Any]  # of metadata.yaml
-    topics: dict[str, Recorded]  # by name, those without messages too
-    namespace: str = NAMESPACE  # of the vehicle that flew
+    bytes: int  # of its files
+    custom: dict[str, str]  # texts by their keys
+    notes: Notes | None  # of `ahv fly`; None in other bags
+    topics: dict[str, Held]  # by name, those without messages too
+    series: dict[LoopTopic, Series]  # of the control loop: topics with messages that were obeyed
+    refused: list[Refused]  # messages of the control loop that no receiver obeyed
+    kept: dict[str, list[bytes]]  # messages of the topics asked for, CDR
+    namespace: str  # of the vehicle that flew
 
-    def name(self, topic: LoopTopic | ViewerTopic) -> str:
-        """Name of a topic in this bag."""
-        return within(self.namespace, topic.name)
 
-    def recorded(self, topic: LoopTopic | ViewerTopic) -> Recorded | None:
-        """What the bag holds of a topic."""
-        return self.topics.get(self.name(topic))
+class Recorded(NamedTuple):
+    """All messages of a topic, in the order of the file."""
+
+    type_name: str
+    log_times: list[int]  # [ns] simulated time in our bags, time of arrival in those of rosbag2
+    messages: list[bytes]  # CDR
+
+
+class _Portion(NamedTuple):
+    """Messages of one topic that lie together in a bag."""
+
+    topic: str
+    type_name: str
+    block: Block
+    places: NDArray[np.intp]  # in the block
+    heads: NDArray[np.void]  # of these messages
+    packed: bool  # each for itself, as rosbag2 does
+    file: PlainFile
+
+    def bodies(self) -> Iterator[tuple[int, bytes]]:
+        """Publisher and CDR of the messages."""
+        for place, publisher in zip(self.places, self.heads["publisher"].tolist(), strict=True):
+            body = self.block.body(place)
+            yield publisher, self.file.room.unpack("zstd", body) if self.packed else body
 
 
 def read_bag(path: Path) -> FlightRecord:
-    """The flight in the bag folder `path`; BagError says in one sentence what is wrong with it.
+    """The flight in the bag `path`; BagError says in one sentence what is wrong with it.
 
     Only steps with a state and all its answers are returned, in the order of their stamps.
     """
-    return flight_of(load_bag(path))
+    return flight_of(read(path))
 
 
-def load_bag(path: Path) -> Bag:
-    """All messages of the bag folder `path`; BagError says in one sentence what is wrong."""
-    metadata = read_metadata(path)
-    missing = missing_files(path, metadata)
-    if missing:
-        raise BagError(f"{path} lacks its {', '.join(missing)}")
-    mode = str(metadata.get("compression_mode") or "").lower()
-    topics: dict[str, Recorded] = {}
-    for name in metadata["relative_file_paths"]:
-        try:
-            data = (path / name).read_bytes()
-            if mode == "file":
-                data = _decompressed(data)
-        except (OSError, zstandard.ZstdError) as error:
-            raise BagError(f"{path} cannot be read: {error}") from error
-        pieces = list(scan(data))
-        for piece in pieces:
-            if isinstance(piece, Damage):
+def read(path: Path, keep: Collection[str] = ()) -> Bag:
+    """What is in the bag `path`, and the messages of the topics `keep`; BagError if it is damaged.
+
+    A message that no receiver obeyed is left out, and counted.
+    """
+    collectors: dict[str, Collector] = {}
+    topics: dict[str, Held] = {}
+    own: list[Metadata] = []
+    kept: dict[str, list[bytes]] = {name: [] for name in keep}
+    others: dict[str, str] = {}  # topics of the loop with messages of another type
+    found = bag_files(path)
+    for portion in _portions(found.path, found.files, topics, own):
+        name, topic = portion.topic, _LOOP.get(portion.topic.rpartition("/")[2])
+        if topic is not None and portion.type_name == topic.layout.type_name:
+            if name not in collectors:
+                collectors[name] = Collector(topic, name, partial(_general, topic))
+            _collect(portion, topic, collectors[name])
+        elif topic is not None:
+            others[name] = portion.type_name
+        elif name in kept:
+            kept[name] += [data for _, data in portion.bodies()]
+    namespace = _namespace(found.path, topics)
+    series: dict[LoopTopic, Series] = {}
+    refused: list[Refused] = []
+    for topic in LOOP_TOPICS:
+        name = within(namespace, topic.name)
+        if name in collectors:
+            collector = collectors.pop(name)
+            try:
+                obeyed = collector.series()
+            except AmbiguousError as error:
                 raise BagError(
-                    f"{path} is not whole: {name}: {piece.what}, from byte {piece.offset} of "
-                    f"{len(data)}; `ahv bag recover {path}` gives what is"
-                )
-        _collect(pieces, topics)
-    if mode == "message":
-        for recorded in topics.values():
-            recorded.messages[:] = map(_decompressed, recorded.messages)
-    return Bag(path, metadata, topics, _namespace(path, topics))
+                    f"{found.path} holds more than one flight, or messages of publishers that it "
+                    f"does not tell apart: {error}"
+                ) from error
+            if len(obeyed.stamps):
+                series[topic] = obeyed
+            refused += collector.refused
+        elif name in others:
+            raise BagError(
+                f"{found.path}: {name} is of type {others[name]}, "
+                f"but must be {topic.layout.type_name}"
+            )
+    if found.metadata is not None:
+        custom = found.metadata.custom
+    else:
+        custom = custom_of_record(own[0]) if own else {}
+    size = sum(file.stat().st_size for file in found.files)
+    return Bag(
+        found.path, size, custom, read_notes(custom), topics, series, refused, kept, namespace
+    )
 
 
-def _namespace(path: Path, topics: Mapping[str, Recorded]) -> str:
+def _namespace(path: Path, topics: Mapping[str, Held]) -> str:
     """Namespace of the vehicle that a bag is of: where its state and its surface command are."""
-    found = [
+    flown = {name for name, held in topics.items() if held.messages}
+    found = sorted(
         namespace
-        for name in topics
-        for namespace in [name.removesuffix(f"/{relative(STATE.name)}")]
-        if name == within(namespace, STATE.name)
-        and all(
-            (recorded := topics.get(within(namespace, topic.name))) and recorded.messages
-            for topic in (STATE, SURFACE_COMMAND)
-        )
-    ]
+        for namespace, _, last in (name.rpartition("/") for name in flown)
+        if last == relative(STATE.name) and within(namespace, SURFACE_COMMAND.name) in flown
+    )
     if len(found) > 1:
         raise BagError(
-            f"{path} holds the flights of {len(found)} vehicles, {' and '.join(sorted(found))}: "
+            f"{path} holds the flights of {len(found)} vehicles, {' and '.join(found[:5])}: "
             "record each into a bag of its own"
         )
     return found[0] if found else NAMESPACE
 
 
-def _collect(pieces: Sequence[Piece], topics: dict[str, Recorded]) -> None:
-    """Add the messages of a whole file to `topics`."""
-    schemas = {piece.id: piece.name for piece in pieces if isinstance(piece, Schema)}
-    channels: dict[int, Recorded] = defaultdict(lambda: Recorded("", [], []))  # nameless ones
-    for piece in pieces:
-        if isinstance(piece, Channel):
-            empty = Recorded(schemas.get(piece.schema_id, ""), [], [])
-            channels[piece.id] = topics.setdefault(piece.topic, empty)
-    for piece in pieces:
-        if isinstance(piece, Block):
-            records = piece.records
-            for channel, log_time, start, end in piece.messages:
-                recorded = channels[channel]
-                recorded.log_times.append(log_time)
-                recorded.messages.append(records[start + HEAD : end])
+def load_bag(path: Path) -> dict[str, Recorded]:
+    """All messages of the bag `path` by topic, as they are: for bags that memory holds."""
+    found = bag_files(path)
+    held: dict[str, Held] = {}
+    topics: dict[str, Recorded] = {}
+    for portion in _portions(found.path, found.files, held, []):
+        recorded = topics.setdefault(portion.topic, Recorded(portion.type_name, [], []))
+        recorded.log_times.extend(portion.heads["log_time"].tolist())
+        recorded.messages.extend(data for _, data in portion.bodies())
+    return {name: Recorded(held[name].type_name, [], []) for name in held} | topics
+
+
+def _portions(
+    bag: Path, files: list[Path], topics: dict[str, Held], own: list[Metadata]
+) -> Iterator[_Portion]:
+    """Messages of a whole bag, in the order of its files; BagError where one is damaged.
+
+    Fills `topics`, and `own` with the last metadata that the files themselves carry.
+    """
+    for path in files:
+        with PlainFile(path) as file:
+            schemas: dict[int, str] = {}
+            channels: dict[int, tuple[str, str]] = {}
+            for piece in scan(file):
+                if isinstance(piece, Damage):
+                    raise BagError(
+                        f"{bag} is not whole: {path.name}: {piece.what}, from byte "
+                        f"{piece.offset} of {file.size}; `ahv bag recover {bag}` gives what is"
+                    )
+                if isinstance(piece, Schema):
+                    schemas[piece.id] = piece.name
+                elif isinstance(piece, Channel):
+                    type_name = schemas.get(piece.schema_id, "")
+                    channels[piece.id] = piece.topic, type_name
+                    topics.setdefault(piece.topic, Held(type_name, 0))
+                elif isinstance(piece, Metadata):
+                    own[:] = [piece]
+                elif isinstance(piece, Block):
+                    try:
+                        yield from _by_channel(piece, file, channels, topics)
+                    except UnpackError as error:
+                        raise BagError(f"{bag} cannot be read: {path.name}: {error}") from error
+
+
+def _by_channel(
+    block: Block,
+    file: PlainFile,
+    channels: dict[int, tuple[str, str]],
+    topics: dict[str, Held],
+) -> Iterator[_Portion]:
+    heads = block.heads
+    for channel in np.unique(heads["channel"]).tolist():
+        if channel not in channels:
+            continue  # messages without a name
+        name, type_name = channels[channel]
+        places = np.flatnonzero(heads["channel"] == channel)
+        packed = block.body(places[0]).startswith(ZSTD_MAGIC)
+        held = topics[name]  # of a topic with channels of two types, the first with messages
+        shown = held.type_name if held.messages else type_name
+        topics[name] = Held(shown, held.messages + len(places))
+        yield _Portion(name, type_name, block, places, heads[places], packed, file)
+
+
+def _collect(portion: _Portion, topic: LoopTopic, collector: Collector) -> None:
+    """Hand messages to their collector: in one go those that have the length of the layout."""
+    if portion.packed:
+        for publisher, data in portion.bodies():
+            collector.message(data, publisher)
+        return
+    block, publishers = portion.block, portion.heads["publisher"]
+    lengths = block.ends[portion.places] - block.starts[portion.places]
+    usual = lengths - HEAD == topic.layout.size
+    collector.rows(block.bodies(portion.places[usual], topic.layout.size), publishers[usual])
+    for place, publisher in zip(portion.places[~usual], publishers[~usual].tolist(), strict=True):
+        collector.message(block.body(place), publisher)
 
 
 def flight_of(bag: Bag) -> FlightRecord:
     """The flight in a bag, as `read_bag` gives it."""
-    series = {topic: _series(bag, topic) for topic in LOOP_TOPICS}
-    missing = [bag.name(topic) for topic in required_topics(bag) if not len(series[topic][0])]
+    missing = [
+        within(bag.namespace, topic.name) for topic in _required(bag) if topic not in bag.series
+    ]
     if missing:
         held = ", ".join(name for name, topic in bag.topics.items() if topic.messages)
+        refused = [entry for entry in bag.refused if entry.topic in missing]
+        why = f"; {refused[0].messages} were refused, first {refused[0].first}" if refused else ""
         raise BagError(
             f"{bag.path} holds no messages on {', '.join(missing)}, "
-            f"but {f'on {held}' if held else 'none at all'}"
+            f"but {f'on {held}' if held else 'none at all'}{why}"
         )
-    flown = {topic: found for topic, found in series.items() if len(found[0])}
-    stamps = next(iter(flown.values()))[0]
-    for found, _ in flown.values():
-        stamps = np.intersect1d(stamps, found, assume_unique=True)
+    stamps = bag.series[STATE].stamps
+    for found, _ in bag.series.values():
+        if not np.array_equal(stamps, found):
+            stamps = np.intersect1d(stamps, found, assume_unique=True)
     if not len(stamps):
         raise BagError(f"{bag.path} holds no step with all of its messages")
-    arrays = {
-        topic: values[np.searchsorted(found, stamps)] for topic, (found, values) in flown.items()
-    }
+    arrays = {topic: _at(found, stamps) for topic, found in bag.series.items()}
     estimates = arrays.get(DISTURBANCE_ESTIMATE)
     return FlightRecord(
         stamps,
@@ -162,92 +272,38 @@ def flight_of(bag: Bag) -> FlightRecord:
         arrays[RATE_COMMAND],
         arrays[SURFACE_COMMAND],
         arrays[THROTTLE_COMMAND][:, 0],
-        _geometric(bag),
+        bag.notes is not None and bag.notes.geometric,
         arrays.get(LEARNER),
         None if estimates is None else estimates[:, 3:],
     )
 
 
-def required_topics(bag: Bag) -> Sequence[LoopTopic]:
+def _at(found: Series, stamps: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Values at stamps that are all there."""
+    if len(found.stamps) == len(stamps):
+        return found.values
+    return found.values[np.searchsorted(found.stamps, stamps)]
+
+
+def _required(bag: Bag) -> tuple[LoopTopic, ...]:
     """Topics of the loop that flew: of the learner too, if the notes say so or one is there."""
-    notes = notes_of(bag.metadata)
-    adaptive = notes is not None and notes["parameters"]["inner_loop"]["adaptive"]
-    there = {name for name, topic in bag.topics.items() if topic.messages}
-    learned = any(bag.name(topic) in there for topic in LEARNER_TOPICS)
+    adaptive = bag.notes is not None and bag.notes.adaptive
+    learned = any(topic in bag.series for topic in LEARNER_TOPICS)
     return LOOP_TOPICS if adaptive or learned else NOMINAL_TOPICS
-
-
-def read_notes(path: Path) -> dict[str, Any] | None:
-    """What `ahv fly` filed with a bag: the case and its parameters; None in other bags."""
-    return notes_of(read_metadata(path))
-
-
-def notes_of(metadata: dict[str, Any]) -> dict[str, Any] | None:
-    """Notes of `ahv fly` in the metadata of a bag, or None."""
-    try:
-        notes = json.loads(metadata["custom_data"][NOTES])
-    except (ValueError, KeyError, TypeError):
-        return None  # a recorder of somebody else's, or none of our notes
-    ours = isinstance(notes, dict) and {"case", "parameters"} <= notes.keys()
-    return notes if ours and {"plant", "inner_loop"} <= notes["parameters"].keys() else None
-
-
-def _decompressed(data: bytes) -> bytes:
-    plain: bytes = zstandard.ZstdDecompressor().decompressobj().decompress(data)
-    return plain
-
-
-def _series(bag: Bag, topic: LoopTopic) -> tuple[NDArray[np.int64], Array]:
-    """Stamps (n,) [ns] in ascending order and values (n, fields) of a topic."""
-    width = len(topic.layout.fields)
-    recorded = bag.recorded(topic)
-    if recorded is None or not recorded.messages:
-        return np.empty(0, np.int64), np.empty((0, width))
-    if recorded.type_name != topic.layout.type_name:
-        raise BagError(
-            f"{bag.path}: {bag.name(topic)} is of type {recorded.type_name}, "
-            f"but must be {topic.layout.type_name}"
-        )
-    messages = recorded.messages
-    stamps, values, places = topic.layout.decode_all(messages)
-    if len(places) < len(messages):
-        others = np.setdiff1d(np.arange(len(messages)), places)
-        try:
-            read = [_general(topic, messages[place]) for place in others]
-        except MessageError as error:
-            raise BagError(f"{bag.path}: {bag.name(topic)}: {error}") from error
-        stamps = np.concatenate((stamps, [stamp for stamp, _ in read]))
-        values = np.concatenate((values, [row for _, row in read]))
-    stamps, first, again = np.unique(stamps, return_index=True, return_inverse=True)
-    if len(first) < len(messages) and values[first][again].tobytes() != values.tobytes():
-        raise BagError(
-            f"{bag.path} holds more than one flight, or messages of another publisher: "
-            f"two messages on {bag.name(topic)} differ and have one stamp"
-        )
-    return stamps, values[first]
 
 
 def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:
     """Read a message of another sender, whose layout is not the usual one.
 
-    By rclpy and not by rosbags, which refuses the surplus bytes that rclpy leaves behind the end;
-    only such a bag needs ROS to be read.
+    With the reader of rosbags, though not through its front door, which refuses the surplus bytes
+    that rclpy leaves behind the end.
     """
+    if data[:2] not in (b"\x00\x00", b"\x00\x01"):
+        raise MessageError("a message of an unknown encoding")
+    definition = _STORE.get_msgdef(topic.layout.type_name)
+    read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
     try:
-        import rclpy
-        from rclpy.serialization import deserialize_message
-
-        from ahv_msgs_py.node.messages import message_class
-    except ModuleNotFoundError as error:
-        raise MessageError("a message of another sender, which only ROS can read") from error
-    try:
-        message = deserialize_message(data, message_class(topic.layout.type_name))
-    except rclpy._rclpy_pybind11.RMWError as error:
+        message, _ = read(data[4:], 0, definition.cls, _STORE)
+    except (SerdeError, StructError, ValueError, IndexError) as error:
         raise MessageError("a message whose bytes are none of the topic's type") from error
     return topic.layout.values_of(message)
-
-
-def _geometric(bag: Bag) -> bool:
-    """Which altitude the flight used; a bag without notes is taken to use the default."""
-    notes = notes_of(bag.metadata)
-    return notes is not None and bool(notes["parameters"]["plant"]["geometric_altitude"])

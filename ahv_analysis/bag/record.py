@@ -1,6 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """A flight as arrays, whether it comes from a bag or from memory, and what is derived from it."""
 
+from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -79,13 +80,11 @@ class FlightRecord:
         Of each step: the mean acceleration, (X_k+1 - X_k) / h, less the nominal f(X_k, U_k). That
         is what the learner has to learn.
         """
-        answers = zip(self.states[:-1].tolist(), self.surfaces[:-1].tolist(), strict=True)
-        nominal = [
-            nominal_response(State(*state), Surfaces(*surfaces), self.geometric)
-            for state, surfaces in answers
-        ]
         mean = np.diff(self.states[:, 3:6], axis=0) / np.diff(self.time)[:, None]
-        return mean - np.reshape(nominal, (-1, 3))
+        for step, rate in enumerate(mean):
+            state, surfaces = State(*self.states[step].tolist()), self.surfaces[step].tolist()
+            rate -= nominal_response(state, Surfaces(*surfaces), self.geometric)
+        return mean
 
     @property
     def inlet_started(self) -> bool:
@@ -108,22 +107,30 @@ def _fill_air_data(states, geometric, rows):
 
 def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     """Arrays of the steps of a library flight."""
-    flown = list(steps)
-    answers = [step.commands for step in flown]
-    learners = [learner_values(step.learner) for step in flown if step.learner]
-    estimates = [
-        disturbance_estimate(step.learner, Rates(step.state.P, step.state.Q, step.state.R))
-        for step in flown
-        if step.learner
-    ]
+    stamps = array("q")
+    states, attitudes, rates, surfaces, throttles, learners, estimates = (
+        array("d") for _ in range(7)
+    )
+    for step in steps:
+        stamps.append(step.stamp)
+        states.extend(step.state)
+        attitudes.extend(step.commands.attitude)
+        rates.extend(step.commands.rates)
+        surfaces.extend(step.commands.surfaces)
+        throttles.append(step.commands.throttle)
+        if step.learner is not None:
+            body = Rates(step.state.P, step.state.Q, step.state.R)
+            learners.extend(learner_values(step.learner))
+            estimates.extend(disturbance_estimate(step.learner, body))
+    count = len(stamps)
     return FlightRecord(
-        np.array([step.stamp for step in flown]),
-        np.array([step.state for step in flown]),
-        np.array([answer.attitude for answer in answers]),
-        np.array([answer.rates for answer in answers]),
-        np.array([answer.surfaces for answer in answers]),
-        np.array([answer.throttle for answer in answers]),
+        np.frombuffer(stamps, np.int64),
+        np.frombuffer(states).reshape(count, -1),
+        np.frombuffer(attitudes).reshape(count, -1),
+        np.frombuffer(rates).reshape(count, -1),
+        np.frombuffer(surfaces).reshape(count, -1),
+        np.frombuffer(throttles),
         geometric,
-        np.array(learners) if learners else None,
-        np.array(estimates) if estimates else None,
+        np.frombuffer(learners).reshape(count, -1) if learners else None,
+        np.frombuffer(estimates).reshape(count, -1) if estimates else None,
     )

@@ -65,6 +65,7 @@ class RecorderNode(BaseNode):
         super().__init__("recorder", RECORDER_PARAMETERS, values, context)
         self.failure: BagError | None = None
         self._bag: BagWriter | None = None
+        self._numbers: dict[str, dict[bytes, int]] = {}  # of the publishers of a topic, by GID
         self._polls = 0
         self._filed: dict[tuple[str, bytes], int] = {}  # newest message of topic and publisher
         self._steps: int | None = None  # of the flight, once it is over
@@ -137,9 +138,11 @@ class RecorderNode(BaseNode):
         for topic, subscription in self._polled.items():
             taken = [message for message in subscription if self._is_new(topic, *message)]
             messages = [data for data, _, _ in taken]
+            numbers = self._numbers.setdefault(topic, {})
+            publishers = [numbers.setdefault(gid, len(numbers) + 1) for _, gid, _ in taken]
             if messages and self.failure is None:
                 try:
-                    self._bag.write(topic, *messages)
+                    self._bag.write(topic, *messages, publishers=publishers)
                 except BagError as error:
                     self._fail(error)
             if topic == FLIGHT.name:

@@ -1,35 +1,43 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""Recovering a bag: what is readable of it goes into a new, complete one beside it."""
+"""Recovering a bag: what is readable of it goes into a new, complete one beside it.
+
+Its files are walked twice: what the topics are called may stand at their ends.
+"""
 
 import json
-import re
 import shutil
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
+from mcap.opcode import Opcode
 from mcap.records import Channel, Metadata, Schema, Statistics
 
+from ahv_analysis.bag.files import find_bag, mcap_files, missing_files
 from ahv_analysis.bag.mcap_file import Index, McapFile
-from ahv_analysis.bag.mcap_scan import Block, Damage, scan
+from ahv_analysis.bag.mcap_scan import HEAD, Block, scan
 from ahv_analysis.bag.metadata import (
     METADATA_FILE,
     BagFile,
+    BagMetadata,
     Topic,
     bag_metadata,
     custom_of_record,
     metadata_record,
-    missing_files,
     read_metadata,
     write_metadata,
 )
+from ahv_analysis.bag.notes import RECOVERED
+from ahv_analysis.bag.plain_file import ZSTD_MAGIC, PlainFile, Room, UnpackError
 from ahv_analysis.errors import BagError
 
-RECOVERED = "ahv_recovered"  # key of the losses in the custom data of a recovered bag, as JSON
 LARGEST = 2**20  # [bytes] of a chunk
+MOST_LOSSES = 100  # of a file that are told one by one
+_HEAD = Struct("<BQ")  # opcode and length of a record
 
 
 class Loss(NamedTuple):
@@ -57,50 +65,54 @@ class Recovery(NamedTuple):
 class _Found(NamedTuple):
     """What is readable of one file."""
 
-    name: str
-    topics: dict[int, tuple[Channel, Schema]]  # by channel
-    blocks: list[Block]
+    path: Path
+    schemas: dict[int, Schema]
+    channels: dict[int, Channel]
+    messages: int  # readable, of channels that are known
     custom: dict[str, str]
     losses: list[Loss]
-    messages: int | None  # by its index, if there is one
+    counted: int | None  # messages by its index, if there is one
+
+    @property
+    def name(self) -> str:
+        """Name of the file that takes it."""
+        return self.path.name.removesuffix(".zstd")
 
 
 def recover(path: Path, out: Path) -> Recovery | None:
-    """Write what is readable of the bag folder `path` to the new folder `out`.
+    """Write what is readable of the bag `path`, a folder or a file, to the new folder `out`.
 
     None, and nothing written, if the bag is whole. Nothing in `path` is touched: a recovery that
     is stopped itself can be begun again, and another tool may yet read more. BagError if nothing
     is readable, or `out` exists or cannot be written.
     """
-    files = sorted(path.glob("*.mcap"), key=_natural)
+    path = find_bag(path)
+    files = mcap_files(path)
     if not files:
         raise BagError(f"{path} is not a bag: there is no MCAP file in it")
-    metadata, losses = {}, []
-    try:
-        metadata = read_metadata(path)
-        absent = missing_files(path, metadata)
-        losses += [Loss(name, 0, 0, "it is missing") for name in absent]
-    except BagError as error:
-        there = (path / METADATA_FILE).exists()
-        losses.append(Loss(METADATA_FILE, 0, 0, str(error) if there else "it is missing"))
-    mode = str(metadata.get("compression_mode") or "none").lower()
-    if mode != "none":
-        raise BagError(
-            f"{path} is compressed by {mode}, but only bags of plain files are recovered"
-        )
-    found = [_read(file) for file in files]
+    metadata, losses = BagMetadata([], None, {}), []
+    if path.is_dir():
+        try:
+            metadata = read_metadata(path)
+            losses += [Loss(name, 0, 0, "it is missing") for name in missing_files(path, metadata)]
+        except BagError as error:
+            there = (path / METADATA_FILE).exists()
+            losses.append(Loss(METADATA_FILE, 0, 0, str(error) if there else "it is missing"))
+    found = [_look(file) for file in files]
     losses += [loss for file in found for loss in file.losses]
     if not losses:
         return None
-    counts = [file.messages for file in found]
-    expected = metadata.get("message_count", None if None in counts else sum(filter(None, counts)))
-    messages = sum(len(block.messages) for file in found for block in file.blocks)
+    counts = [file.counted for file in found]
+    expected = metadata.messages
+    if expected is None and None not in counts:
+        expected = sum(filter(None, counts))
+    messages = sum(file.messages for file in found)
     if not messages:
-        what = "; ".join(f"{loss.file}: {loss.what}" for loss in losses)
+        what = "; ".join(f"{loss.file}: {loss.what}" for loss in losses[:3])
         raise BagError(f"{path} holds no message that can be read ({what})")
-    recovery = Recovery(messages, expected and expected - messages, losses)
-    custom = metadata.get("custom_data")
-    custom = dict(custom) if isinstance(custom, dict) else {}
+    lost = None if expected is None else max(0, expected - messages)
+    recovery = Recovery(messages, lost, losses)
+    custom = dict(metadata.custom)
     for file in found:
         custom = file.custom | custom
     custom[RECOVERED] = json.dumps(recovery.as_json())
@@ -108,40 +120,61 @@ def recover(path: Path, out: Path) -> Recovery | None:
     return recovery
 
 
-def _natural(file: Path) -> list[str | int]:
-    """Key that puts file 10 of a split bag behind file 9."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", file.name)]
-
-
-def _read(file: Path) -> _Found:
-    try:
-        data = file.read_bytes()
-    except OSError as error:
-        raise BagError(f"{file} cannot be read: {error.strerror}") from error
-    pieces = list(scan(data))
-    schemas = {piece.id: piece for piece in pieces if isinstance(piece, Schema)}
-    topics = {
-        piece.id: (piece, schemas[piece.schema_id])
-        for piece in pieces
-        if isinstance(piece, Channel) and piece.schema_id in schemas
-    }
-    losses = [Loss(file.name, *piece) for piece in pieces if isinstance(piece, Damage)]
-    blocks, nameless = [], 0
-    for piece in pieces:
-        if isinstance(piece, Block):
-            kept = [message for message in piece.messages if message[0] in topics]
-            nameless += len(piece.messages) - len(kept)
-            blocks.append(Block(piece.records, kept))
-    if nameless:
-        losses.append(Loss(file.name, 0, 0, f"{nameless} messages are of topics without a name"))
+def _look(path: Path) -> _Found:
+    """Walk a file for its topics, its texts and its losses."""
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
     custom: dict[str, str] = {}
-    counted = None
-    for piece in pieces:
-        if isinstance(piece, Metadata):
-            custom |= custom_of_record(piece)
-        elif isinstance(piece, Statistics):
-            counted = piece.message_count
-    return _Found(file.name, topics, blocks, custom, losses, counted)
+    counts: Counter[int] = Counter()
+    losses: list[Loss] = []
+    counted, unpackable, more = None, 0, 0
+    with PlainFile(path) as file:
+        for piece in scan(file):
+            if isinstance(piece, Schema):
+                schemas[piece.id] = piece
+            elif isinstance(piece, Channel):
+                channels[piece.id] = piece
+            elif isinstance(piece, Metadata):
+                custom |= custom_of_record(piece)
+            elif isinstance(piece, Statistics):
+                counted = piece.message_count
+            elif isinstance(piece, Block):
+                numbers = piece.heads["channel"]
+                counts.update(numbers.tolist())
+                for place in np.flatnonzero(_packed(piece)):
+                    if _unpacked(piece.body(place), file.room) is None:
+                        counts[int(numbers[place])] -= 1
+                        unpackable += 1
+            elif len(losses) < MOST_LOSSES:
+                losses.append(Loss(path.name, *piece))
+            else:
+                more += 1
+    nameless = sum(count for channel, count in counts.items() if channel not in channels)
+    for count, what in (
+        (more, "more parts are damaged"),
+        (nameless, "messages are of topics without a name"),
+        (unpackable, "compressed messages cannot be unpacked"),
+    ):
+        if count:
+            losses.append(Loss(path.name, 0, 0, f"{count} {what}"))
+    messages = counts.total() - nameless
+    return _Found(path, schemas, channels, messages, custom, losses, counted)
+
+
+def _packed(block: Block) -> np.ndarray:
+    """Which messages (n,) of a block are compressed each for itself, as rosbag2 does."""
+    long = np.flatnonzero(block.ends - block.starts >= HEAD + len(ZSTD_MAGIC))
+    packed = np.zeros(len(block.starts), bool)
+    magic = np.frombuffer(ZSTD_MAGIC, np.uint8)
+    packed[long] = np.all(block.bodies(long, len(ZSTD_MAGIC)) == magic, axis=1)
+    return packed
+
+
+def _unpacked(body: bytes, room: Room) -> bytes | None:
+    try:
+        return room.unpack("zstd", body)
+    except UnpackError:
+        return None
 
 
 def _write_bag(out: Path, found: Sequence[_Found], custom: dict[str, str]) -> None:
@@ -152,7 +185,7 @@ def _write_bag(out: Path, found: Sequence[_Found], custom: dict[str, str]) -> No
         try:
             files = [_write_file(out / file.name, file, custom) for file in found]
             write_metadata(out, bag_metadata(files, custom))
-        except OSError:
+        except BaseException:
             shutil.rmtree(out)  # it was begun here
             raise
     except OSError as error:
@@ -161,30 +194,52 @@ def _write_bag(out: Path, found: Sequence[_Found], custom: dict[str, str]) -> No
 
 def _write_file(path: Path, found: _Found, custom: dict[str, str]) -> BagFile:
     file = McapFile(path, f"ahv {version('ahv')}")
-    for schema in {schema.id: schema for _, schema in found.topics.values()}.values():
+    for schema in found.schemas.values():
         file.add_schema(schema)
-    for channel, _ in found.topics.values():
+    for channel in found.channels.values():
         file.add_channel(channel)
-    for records, index in _chunks(found.blocks):
-        file.add_chunk(records, index)
-    topics = {key: Topic.of(*pair) for key, pair in found.topics.items()}
+    with PlainFile(found.path) as source:
+        for piece in scan(source):
+            if isinstance(piece, Block):
+                for records, index in _chunks(piece, found.channels, source.room):
+                    file.add_chunk(records, index)
+    topics = {
+        number: Topic.of(channel, found.schemas.get(channel.schema_id))
+        for number, channel in found.channels.items()
+    }
     written = BagFile(path.name, file.contents, topics)
     file.add_metadata(metadata_record(bag_metadata([written], custom)))
     file.finish()
     return written
 
 
-def _chunks(blocks: Sequence[Block]) -> Iterator[tuple[bytes, Index]]:
-    """Records and index of new chunks: of the blocks, and of parts of those that are large."""
-    for records, messages in blocks:
-        parts: list[bytes] = []
-        entries: dict[int, list[tuple[int, int]]] = defaultdict(list)
-        size = 0
-        for place, (channel, log_time, start, end) in enumerate(messages, 1):
-            entries[channel].append((log_time, size))
-            parts.append(records[start:end])
-            size += end - start
-            if size >= LARGEST or place == len(messages):
-                index = {key: np.array(rows, np.uint64) for key, rows in entries.items()}
-                yield b"".join(parts), index
-                parts, entries, size = [], defaultdict(list), 0
+def _chunks(
+    block: Block, channels: dict[int, Channel], room: Room
+) -> Iterator[tuple[bytes, Index]]:
+    """Records and index of new chunks: of a block, or of parts of one that is large."""
+    parts: list[bytes] = []
+    entries: dict[int, list[tuple[int, int]]] = {}
+    size = 0
+    heads, packed = block.heads, _packed(block)
+    for place, channel in enumerate(heads["channel"].tolist()):
+        if channel not in channels:
+            continue
+        record = block.records[block.starts[place] : block.ends[place]]
+        if packed[place]:
+            body = _unpacked(record[HEAD:], room)
+            if body is None:
+                continue
+            length = HEAD - _HEAD.size + len(body)
+            record = _HEAD.pack(Opcode.MESSAGE, length) + record[_HEAD.size : HEAD] + body
+        entries.setdefault(channel, []).append((int(heads["log_time"][place]), size))
+        parts.append(record)
+        size += len(record)
+        if size >= LARGEST:
+            yield b"".join(parts), _index(entries)
+            parts, entries, size = [], {}, 0
+    if parts:
+        yield b"".join(parts), _index(entries)
+
+
+def _index(entries: dict[int, list[tuple[int, int]]]) -> Index:
+    return {channel: np.array(rows, np.uint64) for channel, rows in entries.items()}

@@ -52,6 +52,7 @@ _QOS = Qos(
     _FOREVER,
     False,
 )
+ONE_PUBLISHER = 1
 LONGEST = 1000  # messages of a topic in one chunk: what a damaged chunk takes with it
 _Chunk = tuple[bytes, Index]  # message records, and where they are
 _STAMP = np.dtype([("seconds", "<i4"), ("nanoseconds", "<u4")])
@@ -63,6 +64,7 @@ class _Inbox(NamedTuple):
     channel: int
     stamp_offset: int | None  # [bytes]
     messages: list[bytes]
+    publishers: list[int]  # of each message
 
 
 class BagWriter:
@@ -136,14 +138,20 @@ class BagWriter:
             )
             self._file.add_channel(topic.channel(number, schemas[type_name]))
             self._topics[number] = topic
-            self._inboxes[name] = _Inbox(number, stamp_offset, [])
+            self._inboxes[name] = _Inbox(number, stamp_offset, [], [])
             self.counts[name] = 0
 
-    def write(self, topic: str, *messages: bytes) -> None:
-        """File messages of CDR bytes; BagError once the disk has failed."""
+    def write(self, topic: str, *messages: bytes, publishers: Sequence[int] = ()) -> None:
+        """File messages of CDR bytes; BagError once the disk has failed.
+
+        `publishers` are numbers of who sent each, from 1 on, by which a reader tells them apart;
+        if not given, all messages are of one.
+        """
         if self.failure is not None:
             raise self.failure
-        self._inboxes[topic].messages.extend(messages)
+        inbox = self._inboxes[topic]
+        inbox.messages.extend(messages)
+        inbox.publishers.extend(publishers or [ONE_PUBLISHER] * len(messages))
         self.counts[topic] += len(messages)
 
     def flush(self) -> None:
@@ -203,12 +211,16 @@ class BagWriter:
         parts: list[bytes] = []
         index: dict[int, NDArray[np.uint64]] = {}
         size = 0
-        for channel, stamp_offset, inbox in self._inboxes.values():
-            messages = inbox[:LONGEST]
-            del inbox[: len(messages)]
-            entries = []
-            for length, run in groupby(messages, len):
-                rows = _rows(channel, list(run), length)
+        for channel, stamp_offset, inbox, numbers in self._inboxes.values():
+            messages, publishers = inbox[:LONGEST], numbers[:LONGEST]
+            del inbox[: len(messages)], numbers[: len(messages)]
+            entries: list[NDArray[np.uint64]] = []
+            done = 0
+            for length, group in groupby(messages, len):
+                run = list(group)
+                rows = _rows(channel, run, length)
+                rows["publisher"] = publishers[done : done + len(run)]
+                done += len(run)
                 times = self._times(rows["data"], stamp_offset)
                 rows["log_time"] = rows["publish_time"] = times
                 offsets = size + rows.itemsize * np.arange(len(rows), dtype=np.uint64)
@@ -231,12 +243,11 @@ class BagWriter:
 
 
 def _rows(channel: int, messages: Sequence[bytes], length: int) -> NDArray[np.void]:
-    """Message records (n,) of messages of one length, without their times."""
+    """Message records (n,) of messages of one length, without their numbers and times."""
     rows = np.empty(len(messages), _record(length))
     rows["opcode"] = Opcode.MESSAGE
     rows["length"] = rows.itemsize - 9
     rows["channel"] = channel
-    rows["sequence"] = 0
     rows["data"] = np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), length)
     return rows
 
@@ -244,5 +255,5 @@ def _rows(channel: int, messages: Sequence[bytes], length: int) -> NDArray[np.vo
 @cache
 def _record(length: int) -> np.dtype:
     """An MCAP message record around `length` bytes of message."""
-    head = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4")]
+    head = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("publisher", "<u4")]
     return np.dtype([*head, ("log_time", "<u8"), ("publish_time", "<u8"), ("data", "u1", length)])

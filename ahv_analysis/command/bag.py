@@ -20,7 +20,9 @@ bag = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-Folder = Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag.")]
+Folder = Annotated[
+    Path, typer.Argument(metavar="BAG", help="Folder of a bag or of a flight, or an MCAP file.")
+]
 UNDISPERSED = 1.0
 
 
@@ -44,15 +46,19 @@ def info(path: Folder, as_json: Json = False) -> None:
 
 
 def _rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
+    from ahv_analysis.bag.info import refused_words
+
     rows = [
         ("case", facts["case"] or "unknown: it has no notes of ahv"),
         ("flown", _span(facts)),
         ("complete", _completeness(facts)),
     ]
+    if facts["refused"]:
+        rows.append(("refused", refused_words(facts["refused"])))
     if facts["notes"]:
         plant = facts["notes"]["parameters"]["plant"]
         dispersed = [
-            f"{name.removeprefix('dispersion.')} {value:g}"
+            f"{name.removeprefix('dispersion.')} {value}"
             for name, value in plant.items()
             if name.startswith("dispersion.") and value != UNDISPERSED
         ]
@@ -86,7 +92,7 @@ def recover(
     """
     from ahv_analysis.bag.recovery import recover as write_recovered
 
-    target = out or path.with_name(f"{path.name}-recovered")
+    target = out or path.with_name(f"{path.name.partition('.mcap')[0]}-recovered")
     with signals_wait():
         recovery = write_recovered(path, target)
     facts: dict[str, Any] = {"source": str(path), "recovered": None}

@@ -83,7 +83,8 @@ def fly(
 
     The bag goes to OUT/bag (MCAP), the summary to OUT/summary.json.
     """
-    from ahv_analysis.bag.reader import flight_of, load_bag
+    from ahv_analysis.bag.info import refused_facts
+    from ahv_analysis.bag.reader import flight_of, read
     from ahv_analysis.flight.case import load_case
     from ahv_analysis.flight.library import fly_library
     from ahv_analysis.flight.summary import missing_states, summarize
@@ -108,16 +109,17 @@ def fly(
             ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
         else:
             ended_early, wall = fly_library(flight, bag, progress=progress)
-    recorded = load_bag(bag)
+    held = read(bag)
     try:
-        record = flight_of(recorded)
+        record = flight_of(held)
     except BagError as error:
         raise GraphError(ended_early or str(error)) from error
     flown = record.stamps[-1] // STEP_NS if ended_early else flight.plant.steps
-    missing = missing_states(recorded, int(flown))
+    missing = missing_states(held, int(flown))
     summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
     summary["dispersion"] = flight.plant.truth.dispersion._asdict()
     summary |= summarize(record, ended_early, flight.control, missing)
+    summary["refused"] = refused_facts(held)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     with signals_wait():
         summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
@@ -170,6 +172,8 @@ def _dispersion(choice: str | None, seed: int, run: int) -> tuple[dict[str, obje
 
 
 def _print_summary(summary: dict[str, Any]) -> None:
+    from ahv_analysis.bag.info import refused_words
+
     final = summary["final_state"]
     low, high = summary["surface_range_deg"]
     least, most = summary["throttle_range"]
@@ -191,4 +195,6 @@ def _print_summary(summary: dict[str, Any]) -> None:
         ("pace", f"{summary['real_time_factor']:.0f} times real time"),
         ("bag", summary["bag"]),
     ]
+    if summary["refused"]:
+        rows.append(("refused", refused_words(summary["refused"])))
     show_table(f"{summary['case']} on the {summary['engine']}", rows)

@@ -69,7 +69,7 @@ def replay(
     recording = read_recording(bag)
     case = _case(recording, parameters)
     names = _names(case, node)
-    steps = max(map(len, recording.topics.values()), default=0)
+    steps = max((len(series.stamps) for series in recording.topics.values()), default=0)
     started = time.perf_counter()
     with progress_bar(f"replaying {bag}", steps, as_json) as progress:
         flown = replay_flight(recording, case, names, rate=rate, progress=progress)
@@ -98,7 +98,7 @@ def _case(recording: "Recording", parameters: str | None) -> "Case":
             f"{recording.path} does not say with which parameters it was flown: "
             "name them by --parameters"
         )
-    return make_case(recording.notes["case"], recording.notes["parameters"])
+    return make_case(recording.notes.case, recording.notes.parameters)
 
 
 def _names(case: "Case", chosen: list[str] | None) -> list[str]:
@@ -130,8 +130,8 @@ def _result(recording: "Recording", case: "Case", flown: "Replay") -> dict[str, 
     return {
         "bag": str(recording.path),
         "case": case.name,
-        "from_s": flown.steps[0] / NANOSECONDS,
-        "to_s": flown.steps[-1] / NANOSECONDS,
+        "from_s": int(flown.steps[0]) / NANOSECONDS,
+        "to_s": int(flown.steps[-1]) / NANOSECONDS,
         **total(flown.comparisons),
         "skipped_steps": sum(flown.skipped.values()),
         "refused": recording.refused,

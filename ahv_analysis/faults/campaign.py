@@ -239,7 +239,7 @@ def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
     recover(bag, recovered)
     stamps = [
         known[0]
-        for data in load_bag(recovered).topics[STATE.name].messages
+        for data in load_bag(recovered)[STATE.name].messages
         if (known := STATE.layout.decode(data)) is not None
     ]
     return {
@@ -306,7 +306,7 @@ def _judge_bag(bag: Path, injected: list[Injection]) -> dict[str, Any]:
     stamps: set[int] = set()
     spoilt = 0  # states that were sent wrongly, and are in the bag as they were sent
     not_finite: Counter[str] = Counter()
-    recorded = load_bag(bag).topics
+    recorded = load_bag(bag)
     for topic in LOOP_TOPICS:
         for data in recorded[topic.name].messages:
             known = topic.layout.decode(data)

@@ -24,9 +24,7 @@ def missing_states(bag: Bag, steps: int) -> int:
 
     In real time a step may lack a command, which came too late or never; a state is never missing.
     """
-    stamps, _, _ = STATE.layout.decode_all(bag.topics[STATE.name].messages)
-    of_flight = (stamps % STEP_NS == 0) & (stamps >= 0) & (stamps <= steps * STEP_NS)
-    return steps + 1 - len(np.unique(stamps[of_flight]))
+    return steps + 1 - int(np.count_nonzero(bag.series[STATE].stamps <= steps * STEP_NS))
 
 
 def summarize(
@@ -64,8 +62,8 @@ def failure(record: FlightRecord, ended_early: str, control: FlightControl) -> C
     A record does not say how the surfaces were found: they are found again.
     """
     previous = NEUTRAL
-    for step, row in enumerate(record.states.tolist()):
-        state = State(*row)
+    for step, row in enumerate(record.states):
+        state = State(*row.tolist())
         rates = Rates(*record.rate_commands[step].tolist())
         if record.learner is None or record.estimates is None:
             solution = nominal_surfaces(state, rates, previous, control.inner)

@@ -1,7 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Figures of a replay: commands as recorded and as replayed, and the difference between them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -10,11 +10,11 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 from ahv_analysis.bag.record import Array
+from ahv_analysis.bag.series import Series
 from ahv_analysis.replay.inputs import Recording
 from ahv_analysis.replay.replay import Replay
 from ahv_analysis.report.figures import STYLE, Plate
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
     DISTURBANCE_ESTIMATE,
@@ -86,8 +86,8 @@ def replay_figures(
 
     def draw(plate: Plate) -> Figure:
         topic = topics[plate.number]
-        messages = recording.topics.get(topic, {})
-        recorded = {stamp: message.values for stamp, message in messages.items()}
+        nothing = Series(np.empty(0, np.int64), np.empty((0, len(topic.layout.fields))))
+        recorded = recording.topics.get(topic, nothing)
         return draw_replay(plate.title, TITLES[topic][1], recorded, flown.answers[topic])
 
     return plates, draw
@@ -96,11 +96,13 @@ def replay_figures(
 def draw_replay(
     title: str,
     lines: Sequence[Line],
-    recorded: Mapping[int, Values],
-    replayed: Mapping[int, Values],
+    recorded: Series,
+    replayed: Series,
 ) -> Figure:
-    """Draw commands by stamp [ns]: on the left both, on the right replayed less recorded."""
-    common = sorted(recorded.keys() & replayed.keys())
+    """Draw commands over time: on the left both, on the right replayed less recorded."""
+    common, before_at, after_at = np.intersect1d(
+        recorded.stamps, replayed.stamps, assume_unique=True, return_indices=True
+    )
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(
             len(lines),
@@ -114,11 +116,13 @@ def draw_replay(
             before, after = _column(recorded, line), _column(replayed, line)
             both.plot(*before, color="0.55", linewidth=2.4, label="recorded")
             both.plot(*after, color="C0", linewidth=1.1, label="replayed")
-            gap = _column(replayed, line, common)[1] - _column(recorded, line, common)[1]
-            between.plot(np.array(common) / NANOSECONDS, gap, color="C3")
+            between.plot(
+                common / NANOSECONDS, after[1][after_at] - before[1][before_at], color="C3"
+            )
             both.set_ylabel(line.label)
-            if max(np.ptp(before[1]), np.ptp(after[1])) < ROUNDING:
-                both.set_ylim(before[1][0] - 1.0, before[1][0] + 1.0)
+            drawn = np.concatenate((before[1], after[1]))
+            if np.ptp(drawn) < ROUNDING:
+                both.set_ylim(drawn[0] - 1.0, drawn[0] + 1.0)
             for axis in (both, between):
                 axis.margins(x=0)
                 axis.ticklabel_format(useOffset=False)
@@ -134,10 +138,6 @@ def draw_replay(
     return figure
 
 
-def _column(
-    values: Mapping[int, Values], line: Line, stamps: Sequence[int] | None = None
-) -> tuple[Array, Array]:
+def _column(series: Series, line: Line) -> tuple[Array, Array]:
     """Time [s] and values of a field, in the unit of its label."""
-    chosen = sorted(values) if stamps is None else stamps
-    column = np.array([values[stamp][line.index] for stamp in chosen])
-    return np.array(chosen) / NANOSECONDS, column * line.scale
+    return series.stamps / NANOSECONDS, series.values[:, line.index] * line.scale

@@ -5,34 +5,23 @@ from ast import literal_eval
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from struct import Struct
-from struct import error as StructError
 from typing import Any, NamedTuple
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from ahv_analysis.bag.reader import Recorded, load_bag, notes_of
+from ahv_analysis.bag.notes import Notes
+from ahv_analysis.bag.reader import read
+from ahv_analysis.bag.series import Series
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
-from ahv_msgs_py.node.guard import Guard, Refusal
-from ahv_msgs_py.node.messages import message_class
-from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.topics import DIAGNOSTICS, LOOP_TOPICS, LoopTopic
+from ahv_msgs_py.topics import DIAGNOSTICS, LoopTopic
 from ahv_plant.model.constants import STEP_NS
 
+LONGEST_NUMBER = 40  # characters
 LEARNER_NODE = "disturbance_learner"
 CHANGED = "parameters changed"  # how a node announces a change, with the values and the stamp
-ONE_VOICE = b""  # a bag does not tell who published a message
-_STAMPS = {1: Struct("<iI"), 0: Struct(">iI")}  # by the second byte of a message: its byte order
-
-
-class Message(NamedTuple):
-    """A recorded message: as it crosses a topic, and what it says."""
-
-    data: bytes  # CDR
-    values: Values
 
 
 class Change(NamedTuple):
@@ -47,60 +36,22 @@ class Recording(NamedTuple):
     """What a bag holds of the control loop."""
 
     path: Path
-    notes: dict[str, Any] | None  # what `ahv fly` filed with it
-    topics: dict[LoopTopic, dict[int, Message]]  # by stamp [ns], rising; topics with messages only
+    notes: Notes | None  # what `ahv fly` filed with it
+    topics: dict[LoopTopic, Series]  # what was obeyed; topics with messages only
     changes: list[Change]
     refused: int  # messages that no receiver obeys
     namespace: str  # of the vehicle that flew
 
 
 def read_recording(path: Path) -> Recording:
-    """The control loop in the bag folder `path`, ordered by stamps, whatever the order of filing.
+    """The control loop in the bag `path`, ordered by stamps, whatever the order of filing.
 
     Raises BagError for what cannot be read.
     """
-    bag = load_bag(path)
-    topics: dict[LoopTopic, dict[int, Message]] = {}
-    refused = 0
-    for topic in LOOP_TOPICS:
-        recorded = _messages(bag.recorded(topic), topic.layout.type_name)
-        obeyed = _obeyed(topic, recorded)
-        refused += len(recorded) - len(obeyed)
-        if obeyed:
-            topics[topic] = obeyed
-    diagnostics = _messages(bag.recorded(DIAGNOSTICS), DIAGNOSTICS.type_name)
-    changes = _changes(diagnostics, bag.namespace)
-    return Recording(path, notes_of(bag.metadata), topics, changes, refused, bag.namespace)
-
-
-def _messages(recorded: Recorded | None, type_name: str) -> list[bytes]:
-    """Messages of a topic, if it is of the type that we know."""
-    return recorded.messages if recorded and recorded.type_name == type_name else []
-
-
-def _obeyed(topic: LoopTopic, recorded: Iterable[bytes]) -> dict[int, Message]:
-    """Messages that a receiver obeys, by their stamps; of two with one stamp the first."""
-
-    def general(data: bytes) -> tuple[int, Values]:
-        message: Any = _deserialized(data, message_class(topic.layout.type_name))
-        return topic.layout.values_of(message)
-
-    guard = Guard(topic, general, clock=lambda: 0, realtime=False, publishers=list)
-    obeyed = {}
-    for data in sorted(recorded, key=_stamp):
-        with suppress(Refusal):
-            stamp, values = guard.read(data, ONE_VOICE, None)
-            obeyed[stamp] = Message(data, values)
-    return obeyed
-
-
-def _stamp(data: bytes) -> int:
-    """Stamp [ns] at the start of a message, -1 if it has none."""
-    try:
-        seconds, nanoseconds = _STAMPS[data[1] & 1].unpack_from(data, 4)
-    except (StructError, IndexError):
-        return -1
-    return int(seconds * NANOSECONDS + nanoseconds)
+    bag = read(path, keep=[DIAGNOSTICS.name])
+    changes = _changes(bag.kept[DIAGNOSTICS.name], bag.namespace)
+    refused = sum(entry.messages for entry in bag.refused)
+    return Recording(bag.path, bag.notes, bag.series, changes, refused, bag.namespace)
 
 
 def _deserialized(data: bytes, message_type: type) -> Any:
@@ -130,7 +81,7 @@ def _changes(diagnostics: Iterable[bytes], namespace: str) -> list[Change]:
 def _value(text: str) -> Value:
     """Value of a parameter as `str` wrote it."""
     with suppress(ValueError, SyntaxError):
-        value = literal_eval(text)
+        value = literal_eval(text[:LONGEST_NUMBER])
         if isinstance(value, bool | int | float):
             return value
     return text

@@ -13,19 +13,22 @@ the order of messages nor the clock changes what they answer.
 
 import os
 import time
-from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
+from functools import partial, reduce
 from typing import NamedTuple
 
+import numpy as np
 import rclpy
+from numpy.typing import NDArray
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 
+from ahv_analysis.bag.series import Series
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import Case
 from ahv_analysis.flight.library import fly
@@ -65,11 +68,39 @@ def answers(name: str) -> list[LoopTopic]:
     return [BY_NAME[topic] for topic in NODES[name].sends]
 
 
+Stamps = NDArray[np.int64]  # (n,) [ns] rising
+
+
+class Answers:
+    """What a node commands on a topic, as it comes: eight bytes a number."""
+
+    def __init__(self, topic: LoopTopic):
+        """Begin with nothing."""
+        self._width = len(topic.layout.fields)
+        self._stamps, self._values = array("q"), array("d")
+
+    def append(self, stamp: int, values: Values) -> None:
+        """Take one command at `stamp` [ns]."""
+        self._stamps.append(stamp)
+        self._values.extend(values)
+
+    def series(self) -> Series:
+        """All of them in the order of their stamps; of two with one stamp the last."""
+        stamps = np.frombuffer(self._stamps, np.int64)[::-1]
+        values = np.frombuffer(self._values).reshape(-1, self._width)[::-1]
+        stamps, last = np.unique(stamps, return_index=True)
+        return Series(stamps, values[last])
+
+
+def _union(stamps: Iterable[Stamps]) -> Stamps:
+    return reduce(np.union1d, stamps, np.empty(0, np.int64))
+
+
 class Replay(NamedTuple):
     """A flight as it was replayed."""
 
-    steps: list[int]  # [ns] stamps that were fed
-    answers: dict[LoopTopic, dict[int, Values]]  # what the nodes commanded, by stamp [ns]
+    steps: Stamps  # that were fed
+    answers: dict[LoopTopic, Series]  # what the nodes commanded
     comparisons: list[Comparison]  # of every topic of every node, with the bag
     skipped: dict[str, int]  # steps of each node that lack inputs in the bag
 
@@ -106,12 +137,13 @@ def replay(
             graph.feed(rate, progress, interrupted)
         finally:
             graph.close()
+    commanded = {topic: given.series() for topic, given in graph.answers.items()}
     comparisons = [
         compare(
             name,
             topic,
             recording.topics.get(topic),
-            graph.answers[topic],
+            commanded[topic],
             graph.complete[name],
         )
         for name in names
@@ -119,9 +151,9 @@ def replay(
     ]
     if not any(entry.compared for entry in comparisons):
         raise BagError(f"{recording.path} holds no command of {', '.join(names)} with its inputs")
-    states = len(recording.topics[STATE])
+    states = len(recording.topics[STATE].stamps)
     skipped = {name: states - len(graph.complete[name]) for name in names}
-    return Replay(graph.steps, graph.answers, comparisons, skipped)
+    return Replay(graph.steps, commanded, comparisons, skipped)
 
 
 def _remapping(recording: Recording, names: Sequence[str]) -> list[str]:
@@ -162,11 +194,9 @@ class _Graph:
         self, recording: Recording, case: Case, names: Sequence[str], context: rclpy.Context
     ):
         self._recording = recording
-        self.steps = sorted(set().union(*recording.topics.values()))
-        self.answers: dict[LoopTopic, dict[int, Values]] = {
-            topic: {} for name in names for topic in answers(name)
-        }
-        self.complete: dict[str, list[int]] = {}  # stamps of the steps that a node can answer
+        self.steps = _union(series.stamps for series in recording.topics.values())
+        self.answers = {topic: Answers(topic) for name in names for topic in answers(name)}
+        self.complete: dict[str, Stamps] = {}  # of the steps that a node can answer
         self._received = 0
         self._wanted = 0
         self._reached = Future(executor=None)
@@ -211,24 +241,27 @@ class _Graph:
         decoded = topic.layout.decode(data)
         assert decoded is not None  # our own nodes keep to the layout
         stamp, values = decoded
-        self.answers[topic][stamp] = values
+        self.answers[topic].append(stamp, values)
         self._received += 1
         if self._received == self._wanted and not self._reached.done():
             self._reached.set_result(None)
 
-    def _complete(self, name: str, node: BaseNode) -> list[int]:
+    def _complete(self, name: str, node: BaseNode) -> Stamps:
         """Stamps of the steps that a node has all inputs of; BagError if it can have none."""
         inputs = [topic for topic in LOOP_TOPICS if topic in node.heard]
         self._check(name, [*inputs, *answers(name)])
         states = self._stamps(STATE)
-        common = set.intersection(*(self._stamps(topic) for topic in inputs))
+        common = states
+        for topic in inputs:
+            common = np.intersect1d(common, self._stamps(topic), assume_unique=True)
         if name == LEARNER_NODE:  # learns from the step before; starts at any state
-            common = {min(states)} | {stamp + STEP_NS for stamp in common} & states
-        return sorted(common)
+            later = np.intersect1d(common + STEP_NS, states, assume_unique=True)
+            common = np.union1d(states[:1], later)
+        return common
 
     def _check(self, name: str, topics: Sequence[LoopTopic]) -> None:
         notes = self._recording.notes
-        nominal = notes is None or not notes["parameters"]["inner_loop"]["adaptive"]
+        nominal = notes is None or not notes.adaptive
         for topic in topics:
             replayed = nominal and topic in LEARNER_TOPICS and topic in self.answers
             if topic not in self._recording.topics and not replayed:
@@ -237,10 +270,10 @@ class _Graph:
                     f"without which {name} cannot be replayed"
                 )
 
-    def _stamps(self, topic: LoopTopic) -> set[int]:
+    def _stamps(self, topic: LoopTopic) -> Stamps:
         """Stamps at which the nodes hear a topic, recorded or replayed."""
         recorded = self._recording.topics.get(topic)
-        return set(recorded if recorded is not None else self.complete[LEARNER_NODE])
+        return self.complete[LEARNER_NODE] if recorded is None else recorded.stamps
 
     def feed(
         self,
@@ -256,8 +289,9 @@ class _Graph:
             for topic in self._recording.topics
         }
         changes = list(self._recording.changes)
+        following = dict.fromkeys(publish, 0)  # place of the message of every topic that is next
         started = time.monotonic()
-        for number, stamp in enumerate(self.steps):
+        for number, stamp in enumerate(map(int, self.steps)):
             if rate is not None:
                 due = started + (stamp - self.steps[0]) / NANOSECONDS / rate
                 while (left := due - time.monotonic()) > 0.0 and not interrupted():
@@ -270,10 +304,12 @@ class _Graph:
                 return
             while changes and changes[0].stamp <= stamp:
                 self._change(changes.pop(0))
-            for topic, messages in self._recording.topics.items():
-                if stamp in messages:
-                    publish[topic](messages[stamp].data)
-        self._await_answers(self.steps[-1] + 1)
+            for topic, (stamps, values) in self._recording.topics.items():
+                place = following[topic]
+                if place < len(stamps) and stamps[place] == stamp:
+                    publish[topic](topic.layout.encode(stamp, values[place].tolist()))
+                    following[topic] += 1
+        self._await_answers(int(self.steps[-1]) + 1)
         progress(len(self.steps))
 
     def _await_answers(self, end: int) -> None:
@@ -299,7 +335,8 @@ class _Graph:
 
     def _expected(self, end: int) -> int:
         return sum(
-            len(answers(name)) * bisect_left(stamps, end) for name, stamps in self.complete.items()
+            len(answers(name)) * int(np.searchsorted(stamps, end))
+            for name, stamps in self.complete.items()
         )
 
     def _change(self, change: Change) -> None:

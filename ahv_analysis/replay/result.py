@@ -1,14 +1,14 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Recorded and replayed commands side by side."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ahv_analysis.replay.inputs import Message
+from ahv_analysis.bag.series import Series
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.topics import LoopTopic
 
 
@@ -57,29 +57,29 @@ class Comparison(NamedTuple):
 def compare(
     node: str,
     topic: LoopTopic,
-    recorded: Mapping[int, Message] | None,
-    replayed: Mapping[int, Values],
-    complete: Sequence[int],
+    recorded: Series | None,
+    replayed: Series,
+    complete: NDArray[np.int64],
 ) -> Comparison:
     """Compare what `node` commanded on `topic`, by stamp [ns], bit for bit.
 
     `recorded` is None if the bag does not have the topic; `complete` are the stamps of the steps
     that the node had all inputs of.
     """
-    known = recorded or {}
-    common = sorted(known.keys() & replayed.keys())
     first = largest = None
     differing = 0
-    if common:
-        before = np.array([known[stamp].values for stamp in common])
-        after = np.array([replayed[stamp] for stamp in common])
+    known = np.empty(0, np.int64) if recorded is None else recorded.stamps
+    common = np.intersect1d(known, replayed.stamps, assume_unique=True)
+    if recorded is not None and len(common):
+        before = recorded.values[np.searchsorted(known, common)]
+        after = replayed.values[np.searchsorted(replayed.stamps, common)]
         unlike = before.view(np.uint64) != after.view(np.uint64)
         differing = int(np.count_nonzero(unlike.any(axis=1)))
         if differing:
             sizes = np.where(unlike, np.abs(after - before), -1.0)
             first, largest = (
                 Difference(
-                    common[row],
+                    int(common[row]),
                     node,
                     topic.name,
                     topic.layout.fields[column],
@@ -97,8 +97,8 @@ def compare(
         recorded is not None,
         len(common),
         differing,
-        len((known.keys() & set(complete)) - replayed.keys()),
-        len(replayed.keys() - known.keys()) if known else 0,
+        len(np.setdiff1d(np.intersect1d(known, complete), replayed.stamps)),
+        len(np.setdiff1d(replayed.stamps, known)) if len(known) else 0,
         first,
         largest,
     )

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from ahv_analysis.bag.record import Array, FlightRecord
 from ahv_analysis.interrupt import signals_wait
+from ahv_analysis.report.drawn import drawn, drawn_time
 from ahv_plant.model.constants import DEGREES, UNSTART_ALPHA
 
 
@@ -165,17 +166,17 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
         for panel, axis in zip(plate.panels, axes, strict=True):
             seen = []
             for label, record in flights.items():
-                values = panel.values(record)
                 end = _flying(record)
                 lost = end < len(record.stamps) or (record.steps < longest and label != subject)
-                time, drawn = record.time[:end], values[:end]
-                axis.plot(time, drawn, color=COLOURS[label], label=label)
+                flown = record.time[:end]
+                time, values = drawn_time(flown), drawn(flown, panel.values(record)[:end])
+                axis.plot(time, values, color=COLOURS[label], label=label)
                 if lost:
-                    axis.plot(time[-1], drawn[-1], "x", color=COLOURS[label])
+                    axis.plot(time[-1], values[-1], "x", color=COLOURS[label])
                 if label == subject or not lost:
-                    seen.append(drawn)
+                    seen.append(values)
                 if panel.command is not None and label == subject:
-                    command = panel.command(record)[:end]
+                    command = drawn(flown, panel.command(record)[:end])
                     axis.plot(time, command, label="command", **COMMAND_STYLE)
                     seen.append(command)
             _scale(axis, np.concatenate(seen), panel.bound if len(flights) > 1 else None)
@@ -250,7 +251,8 @@ def _scale(axis: pyplot.Axes, values: Array, bound: float | None) -> None:
 
     A quantity that is nothing but rounding is drawn as the zero that it is.
     """
-    low, high = float(np.min(values)), float(np.max(values))
+    there = values[np.isfinite(values)]
+    low, high = (float(np.min(there)), float(np.max(there))) if len(there) else (0.0, 0.0)
     if bound is not None:
         low, high = min(low, -1.3 * bound), max(high, 1.3 * bound)
     if high - low < 1e-6:

@@ -5,6 +5,7 @@ States are samples. A command holds from its step to the next one, as the plant 
 the last step was never flown.
 """
 
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -204,10 +205,19 @@ def measure(record: FlightRecord, settings: Settings) -> dict[str, Any]:
         assert values is not None and stops is not None
         controls[signal.name] = use(time, values, stops)._asdict()
     learned = learning(record)
-    return {
-        "tracking": tracked,
-        "controls": controls,
-        "margins": {name: found._asdict() for name, found in margins(record).items()},
-        "learner": learned and {axis: found._asdict() for axis, found in learned.items()},
-        "fuel_kg": fuel(record),
-    }
+    return _finite(
+        {
+            "tracking": tracked,
+            "controls": controls,
+            "margins": {name: found._asdict() for name, found in margins(record).items()},
+            "learner": learned and {axis: found._asdict() for axis, found in learned.items()},
+            "fuel_kg": fuel(record),
+        }
+    )
+
+
+def _finite(facts: Any) -> Any:
+    """Numbers that are none, as of a flight with absurd values, do not apply."""
+    if isinstance(facts, dict):
+        return {name: _finite(value) for name, value in facts.items()}
+    return None if isinstance(facts, float) and not isfinite(facts) else facts

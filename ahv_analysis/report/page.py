@@ -10,16 +10,18 @@ from importlib.resources import files
 from io import StringIO
 from typing import Any, NamedTuple
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib import pyplot
 
+from ahv_analysis.bag.info import refused_words
 from ahv_analysis.bag.record import Array
+from ahv_analysis.report.drawn import EXACT, drawn, drawn_time, thinned_to
 from ahv_analysis.report.page_figures import flight_figures
 from ahv_analysis.report.page_flight import Flight
 from ahv_analysis.report.signals import AXES, CONTROLS, GROUPS, TRACKED, Group, Signal
 from ahv_msgs_py.graph import NODES, case_nodes
 from ahv_msgs_py.parameters import Value
+from ahv_plant.model.constants import STEP
 
 PAGE = "template"  # folder of template, style, script and plotting library
 NONE = "–"  # of what does not apply
@@ -97,6 +99,15 @@ def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
         settings=list(_settings(flights)),
         figures=[b64encode(figure.encode()).decode() for figure in figures],
         data=_data(flights),
+        thinned={
+            flight.name: span
+            for flight in flights
+            if (span := thinned_to(flight.record.time)) is not None
+        },
+        exact=EXACT * STEP,
+        refused={
+            flight.name: refused_words(flight.refused) for flight in flights if flight.refused
+        },
         assets={name: (folder / name).read_text(encoding="utf-8") for name in names},
     )
 
@@ -194,10 +205,14 @@ def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
 
 
 def _data(flights: Sequence[Flight]) -> str:
-    """What page.js draws, as JSON that can stand within HTML: every step of every flight."""
+    """What page.js draws, as JSON that can stand within HTML."""
     content = {
         "flights": [
-            {"name": flight.name, "lost": flight.lost_at, "time": _encode(flight.record.time)}
+            {
+                "name": flight.name,
+                "lost": flight.lost_at,
+                "time": _encode(drawn_time(flight.record.time)),
+            }
             for flight in flights
         ],
         "plots": [
@@ -211,13 +226,15 @@ def _plot(signal: Signal, flights: Sequence[Flight]) -> dict[str, Any]:
     bounds = {signal.bounds(flight.settings) for flight in flights} - {None}
     lines = []
     for index, flight in enumerate(flights):
-        values = signal.values(flight.record)
+        values, time = signal.values(flight.record), flight.record.time
         if values is None:
             continue
-        lines.append({"flight": index, "reference": False, "values": _encode(values)})
+        lines.append({"flight": index, "reference": False, "values": _encode(drawn(time, values))})
         reference = signal.reference(flight.record, flight.settings)
         if reference is not None:
-            lines.append({"flight": index, "reference": True, "values": _encode(reference)})
+            lines.append(
+                {"flight": index, "reference": True, "values": _encode(drawn(time, reference))}
+            )
     return {
         "name": signal.name,
         "referenceName": signal.reference_name,
@@ -227,8 +244,5 @@ def _plot(signal: Signal, flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def _encode(values: Array) -> str:
-    """Little-endian 32-bit floats in base64; what they cannot hold becomes NaN, a gap."""
-    with np.errstate(over="ignore"):
-        single = values.astype("<f4")
-    single[~np.isfinite(single)] = np.nan
-    return b64encode(single.tobytes()).decode()
+    """Little-endian 32-bit floats in base64."""
+    return b64encode(values.astype("<f4").tobytes()).decode()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ahv_analysis.bag.reader import read_bag, read_notes
+from ahv_analysis.bag.reader import flight_of, read
 from ahv_analysis.bag.record import FlightRecord, record
 from ahv_analysis.campaign.batch import fly_trajectory
 from ahv_analysis.campaign.campaign import Campaign
@@ -35,9 +35,9 @@ DRAWN_EVERY = 10  # steps between the points of a campaign's lines
 
 def bag_figures(bag: Path) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
     """Which figures of the report a bag is for, and how to draw one."""
-    notes = read_notes(bag)
-    case = make_case(notes["case"], notes["parameters"]) if notes else None
-    return flight_figures(read_bag(bag), case)
+    held = read(bag)
+    case = make_case(held.notes.case, held.notes.parameters) if held.notes else None
+    return flight_figures(flight_of(held), case)
 
 
 def flight_figures(

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ahv_analysis.bag.reader import flight_of, load_bag, notes_of
+from ahv_analysis.bag.info import refused_facts
+from ahv_analysis.bag.reader import flight_of, read
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.errors import BagError
 from ahv_analysis.flight.case import Case, make_case
@@ -40,6 +41,7 @@ class Flight(NamedTuple):
     metrics: dict[str, Any]
     ended_early: str  # why, empty if it did not
     cause: Cause | None  # of its failure, as in a campaign; None without a case
+    refused: list[dict[str, Any]]  # messages of the bag that no receiver obeyed
 
     @property
     def settings(self) -> Settings:
@@ -81,15 +83,17 @@ def read_flights(bags: Sequence[Path]) -> list[Flight]:
 
 
 def _read(bag: Path, name: str) -> Flight:
-    loaded = load_bag(bag)
-    record, notes = flight_of(loaded), notes_of(loaded.metadata) or {}
+    held = read(bag)
+    record, notes = flight_of(held), held.notes
     if record.steps < 1:
         raise BagError(f"{bag} holds no two steps with all their messages: there was no flight")
-    case = make_case(notes["case"], notes["parameters"]) if notes else None
+    case = make_case(notes.case, notes.parameters) if notes else None
     metrics = measure(record, case.control if case else None)
     ended_early = why_ended_early(record, case) if case else ""
     cause = failure(record, ended_early, case.control) if case else None
-    return Flight(name, bag, record, notes, case, metrics, ended_early, cause)
+    content = notes.content if notes else {}
+    refused = refused_facts(held)
+    return Flight(name, bag, record, content, case, metrics, ended_early, cause, refused)
 
 
 def page_names(bags: Sequence[Path]) -> list[str]:
