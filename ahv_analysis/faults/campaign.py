@@ -26,6 +26,7 @@ from ahv_analysis.flight.watcher import Watcher
 from ahv_analysis.interrupt import signals_wait
 from ahv_msgs_py.graph import controllers, listeners
 from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
@@ -180,6 +181,7 @@ def run_campaign(
 def _watched_flight(bag: Path, can_fail: bool) -> Iterator[tuple[Spectator, ProcessGraph]]:
     """Fly while somebody looks on; a signal ends it in order, and the looks at once."""
     keep_to_this_machine()
+    log_where_it_can()
     case = load_case(CASE, {"duration": 3600.0})
     graph = ProcessGraph(case, bag, realtime=True, spectators=1, can_fail=can_fail)
     with signals_wait() as interrupted:

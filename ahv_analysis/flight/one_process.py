@@ -17,6 +17,7 @@ from ahv_analysis.interrupt import signals_wait
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.namespace import ros_arguments
 from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, NOMINAL_TOPICS, STATE, LoopTopic
@@ -68,6 +69,7 @@ def _fly_graph(
     interrupted: Callable[[], bool],
 ) -> tuple[str, float]:
     keep_to_this_machine()
+    log_where_it_can()
     context = rclpy.Context()
     rclpy.init(args=ros_arguments(namespace), context=context, domain_id=domain)
     executor = EventsExecutor(context=context)

@@ -23,6 +23,7 @@ from ahv_analysis.flight.library import INTERRUPTED
 from ahv_analysis.interrupt import SIGNALS, signals_wait
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.process import run
@@ -233,6 +234,7 @@ def fly_processes(
     A signal ends the flight in order, as there.
     """
     keep_to_this_machine(shared_memory=not realtime)
+    log_where_it_can()
     graph = ProcessGraph(case, bag, realtime)
     with signals_wait() as interrupted, graph:
         return _watch(graph, realtime, progress, interrupted)

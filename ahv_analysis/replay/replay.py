@@ -40,6 +40,7 @@ from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.namespace import ros_arguments
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.network import DISCOVERY_RANGE, keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
@@ -176,6 +177,7 @@ def _context(
     before = os.environ[DISCOVERY_RANGE]
     if hidden:
         os.environ[DISCOVERY_RANGE] = "OFF"
+    log_where_it_can()
     context = rclpy.Context()
     try:
         rclpy.init(args=list(arguments), context=context, domain_id=domain)

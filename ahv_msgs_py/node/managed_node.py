@@ -150,22 +150,27 @@ class ManagedNode(LifecycleNode):
         super().destroy_node()
 
     def _transition(self, work: Callable[[], None]) -> TransitionCallbackReturn:
-        """Do the work of a transition; rclpy would swallow what it raises."""
+        """Do the work of a transition; rclpy would swallow what it raises.
+
+        Why it failed is told once: by `bring_up` to its caller, to that of the service by the log.
+        """
+        self.refusal = self.refusal if not self.settings else ""
         try:
             work()
         except ParameterError as error:
             self.refusal = str(error)
-            self.get_logger().error(self.refusal)
             return TransitionCallbackReturn.FAILURE
         except Exception:
             self.refusal = traceback.format_exc()
-            self.get_logger().error(self.refusal)
             return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
 
     def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
         try:
-            return change(request, response)
+            answer = change(request, response)
+            if not answer.success and self.refusal:
+                self.get_logger().error(self.refusal)
+            return answer
         except rclpy._rclpy_pybind11.RCLError as error:
             self.get_logger().warning(f"impossible transition: {str(error).splitlines()[0]}")
             response.success = False

@@ -12,6 +12,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.deadline import end_within
+from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.managed_node import AUTOSTART
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.real_time import take_precedence
@@ -32,8 +33,9 @@ def run(node_class: Callable[[], BaseNode]) -> None:
     for number in SIGNALS:  # never in the middle of a message, and a second one changes nothing
         signal.signal(number, lambda *_: stop.set())
     try:
+        log_where_it_can()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # arguments that ROS itself refuses
+    except (RuntimeError, ParameterError) as error:  # arguments that ROS itself refuses
         print(" ".join(str(error).split()), file=sys.stderr)
         sys.exit(2)
     code = 1  # if something happens that nobody thought of
