@@ -50,7 +50,7 @@ def generate_launch_description() -> LaunchDescription:
 def _replay(context: LaunchContext) -> list[ExecuteProcess]:
     given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     # as a module: pip and colcon put the command `ahv` into different folders
-    command = [sys.executable, "-m", "ahv_analysis.command.main", "replay", given["bag"]]
+    command = [sys.executable, "-P", "-m", "ahv_analysis.command.main", "replay", given["bag"]]
     for node in given["nodes"].split():
         command += ["--node", node]
     for name in ("parameters", "rate", "out"):

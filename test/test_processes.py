@@ -3,6 +3,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from contextlib import contextmanager
 from ipaddress import ip_address
@@ -34,6 +36,8 @@ from ahv_msgs_py.node.network import DISCOVERY_RANGE, PROFILES, keep_to_this_mac
 from ahv_msgs_py.node.real_time import PRIORITY
 from ahv_msgs_py.topics import SURFACE_COMMAND
 from ahv_plant.model.constants import DEGREES, STEP_NS
+from test.ends import beside
+from test.ends import fly as fly_by_command
 
 CASE = "neuro_adaptive_sc_gdi"
 TRACKING = 0.5  # [deg], [deg/s] within which a disturbed flight is back
@@ -64,6 +68,16 @@ def test_processes_in_lockstep_fly_the_same_bits_and_leave_nothing(tmp_path, dom
     flown, computed = read_bag(tmp_path / "bag"), record(fly(case), False)
     for name in ("stamps", "states", "surfaces", "throttle", "learner", "estimates"):
         assert np.array_equal(getattr(flown, name), getattr(computed, name)), name
+
+
+def test_what_lies_in_the_working_directory_does_not_fly(tmp_path):
+    """Another checkout, say: the processes run the code that their command belongs to."""
+    (tmp_path / "ahv_plant").mkdir()
+    (tmp_path / "ahv_plant" / "__init__.py").write_text("open('flew', 'w')\n")
+    command = [Path(sys.executable).parent / "ahv", "fly", "nominal_di", "--processes"]
+    flown = subprocess.run([*command, "--duration", "0.1", "--out", "flight"], cwd=tmp_path)
+    assert flown.returncode == 0
+    assert not (tmp_path / "flew").exists()
 
 
 def test_a_controller_that_dies_in_lockstep_ends_the_flight(tmp_path):
@@ -222,3 +236,14 @@ def test_wrong_messages_are_wrong():
     for kind in EXPECTED:
         if kind not in ("killed", "stopped", "second publisher"):
             assert wrong_messages(SURFACE_COMMAND, kind, whole, before) != [whole], kind
+
+
+@pytest.mark.slow
+def test_every_end_comes_within_ten_seconds(tmp_path):
+    """With somebody who looks on, and both cores busy: `python -m test.ends` flies 200 times."""
+    with beside(observers=1, busy=os.cpu_count()):
+        for number in range(5):
+            end = fly_by_command(tmp_path / str(number), 3.0)
+            assert end.code == 0
+            assert end.summed_up
+            assert end.seconds < 10.0

@@ -429,8 +429,8 @@ def launch(monkeypatch):
 def test_launch_replays_where_tools_can_watch(launch):
     python, *command = launch(bag="flights/one/bag")
     assert python == sys.executable
-    assert command[:3] == ["-m", "ahv_analysis.command.main", "replay"]
-    assert command[3:] == ["flights/one/bag", "--rate", "1.0"]
+    assert command[:4] == ["-P", "-m", "ahv_analysis.command.main", "replay"]
+    assert command[4:] == ["flights/one/bag", "--rate", "1.0"]
 
 
 def test_launch_hands_its_arguments_on(ahv, launch, bags, tmp_path):
@@ -440,7 +440,7 @@ def test_launch_hands_its_arguments_on(ahv, launch, bags, tmp_path):
     command = launch(
         bag=str(bags / "nominal_di"), nodes=nodes, parameters="nominal_di", rate="", out=str(out)
     )
-    result = ahv(*command[3:])
+    result = ahv(*command[4:])
     assert result.exit_code == 0
     assert "All 301 commands are alike" in result.stdout
     assert len(list(out.iterdir())) == 2

@@ -29,8 +29,10 @@ from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import Value
+from ahv_plant.numerics.elementwise import source_hash
 from ahv_plant.plant_node import PlantNode
 
+SAFE_PATH = "PYTHONSAFEPATH"
 LONGEST_START = 30.0  # [s] until the first state
 LONGEST_SILENCE = 10.0  # [s] without a sign of the plant, after which the graph has failed
 LONGEST_END = 10.0  # [s] for a process to end by itself
@@ -74,8 +76,17 @@ def _run_node(
     can_fail: bool,
     environment: dict[str, str],
     report: FlightReport,
+    source: str,
 ) -> None:
-    """Be the process of a node; the server has the environment of when it was started."""
+    """Be the process of a node; the server has the environment of when it was started.
+
+    It has to run the code of `source`, which is filed with the flight.
+    """
+    from ahv_analysis.flight.node_server import SOURCE  # loaded by the server; compiles all laws
+
+    if source != SOURCE:
+        print(f"{name}: the code in {Path(__file__).parents[2]} has changed", file=sys.stderr)
+        sys.exit(2)
     os.environ.update(environment)
     sys.argv = [name]
     if values[REALTIME.name]:
@@ -122,6 +133,7 @@ class ProcessGraph:
         `spectators` listen to the state from outside; nodes that `can_fail` do so when told to.
         """
         self._can_fail = can_fail
+        self._source = source_hash()
         self.controllers = case.controllers
         listeners = len(self.controllers) + (bag is not None) + spectators
         mode: dict[str, Value] = {REALTIME.name: realtime}
@@ -133,6 +145,7 @@ class ProcessGraph:
         self.values["plant"] = case.parameters["plant"] | mode | {"listeners": listeners}
         self.processes: dict[str, BaseProcess] = {}
         self._context = multiprocessing.get_context("forkserver")
+        os.environ[SAFE_PATH] = "1"  # or the server imports what lies in the working directory
         self.report = FlightReport(self._context)
         self._context.set_forkserver_preload(
             [
@@ -169,7 +182,7 @@ class ProcessGraph:
         }
         process = self._context.Process(
             target=_run_node,
-            args=(name, self.values[name], self._can_fail, environment, self.report),
+            args=(name, self.values[name], self._can_fail, environment, self.report, self._source),
             name=name,
             daemon=True,
         )

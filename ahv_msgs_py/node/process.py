@@ -9,6 +9,7 @@ from collections.abc import Callable
 import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.deadline import end_within
@@ -19,6 +20,7 @@ from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import ParameterError
 
 LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
+SETTLE = 0.05  # [s] of the executor at the end
 LONGEST_TEARDOWN = 2.0  # [s] of a node that has done what it had to
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -50,6 +52,8 @@ def run(node_class: Callable[[], BaseNode]) -> None:
             node.bring_up()
         while not (node.finished.done() or stop.is_set()):
             executor.spin_until_future_complete(node.finished, LOOK)
+        # what was begun is ended, or the executor holds the node and all that it has of DDS
+        executor.spin_until_future_complete(Future(executor=None), SETTLE)
         code = 1 if node.finished.done() and node.finished.result() else 0
     except ParameterError as error:
         print(error, file=sys.stderr)
