@@ -20,6 +20,14 @@ def test_ctrl_c_in_a_flight(ways, tmp_path):
     assert fault(end, "INT", tmp_path / "out" / "bag") == "", end.said
 
 
+def test_ctrl_c_while_a_campaign_compiles(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    command = [AHV, "monte-carlo", "--controller", "nominal_di", "--out", "out"]
+    end = interrupted(command, tmp_path, lambda said: b"compiling, once" in said)
+    assert fault(end, "INT", tmp_path / "out" / "bag") == "", end.said
+    assert "interrupted after 0 of 1000 runs; the same command resumes" in end.said
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("ways", WAYS, ids=" ".join)
 def test_signals_at_random_moments(ways):

@@ -5,9 +5,11 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Lock
 from typing import Annotated, Any
 
 import typer
+from numba.core.event import Listener, install_listener
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -109,6 +111,28 @@ class Reported:
         self._progress(done)
 
 
+class _Compiling(Listener):
+    """Says when laws are compiled, which the first flight after a change waits for."""
+
+    def __init__(self, say: Callable[[str], None]):
+        self._say = say
+        self._lock = Lock()  # threads compile too
+        self._depth = 0  # a law's functions are compiled while it is
+
+    def _change(self, by: int) -> None:
+        with self._lock:
+            self._depth += by
+            self._say(": compiling, once" if self._depth else "")
+
+    def on_start(self, event: object) -> None:
+        """Something is compiled, and was not in the cache."""
+        self._change(1)
+
+    def on_end(self, event: object) -> None:
+        """It is."""
+        self._change(-1)
+
+
 @contextmanager
 def progress_bar(
     title: str, total: int, hidden: bool, unit: str = "steps"
@@ -123,7 +147,9 @@ def progress_bar(
     )
     with Progress(*columns, console=Terminal(stderr=True), disable=hidden, transient=True) as bar:
         task = bar.add_task(title, total=total)
-        yield lambda done: bar.update(task, completed=done)
+        compiling = _Compiling(lambda note: bar.update(task, description=title + note))
+        with install_listener("numba:compile", compiling):
+            yield lambda done: bar.update(task, completed=done)
 
 
 def show_table(title: str, rows: list[tuple[str, str]]) -> None:
