@@ -11,32 +11,24 @@ import pyarrow.parquet
 import pytest
 import xarray
 
-from ahv_analysis.bag.dataset import (
-    AIR_SIGNALS,
-    ATTITUDE_SIGNALS,
-    ESTIMATE_SIGNALS,
-    EXPORTS,
-    LEARNER_SIGNALS,
-    RATE_SIGNALS,
-    STATE_SIGNALS,
-    SURFACE_SIGNALS,
-    THROTTLE_SIGNALS,
-    bag_dataset,
-)
+from ahv_analysis.bag.dataset import EXPORTS, bag_dataset
 from ahv_analysis.bag.reader import read_bag
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly_library
-from ahv_msgs_py.topics import BASIS_NAMES, LEARNER_NAMES, LOOP_TOPICS
+from ahv_analysis.quantities import QUANTITIES
+from ahv_msgs_py.topics import (
+    ATTITUDE_COMMAND,
+    BASIS_NAMES,
+    DISTURBANCE_ESTIMATE,
+    LEARNER,
+    LEARNER_NAMES,
+    RATE_COMMAND,
+    STATE,
+    SURFACE_COMMAND,
+    THROTTLE_COMMAND,
+)
 from ahv_plant.model.aerodynamics import air_data
 from ahv_plant.model.vectors import State
-
-RECORDED = (
-    *STATE_SIGNALS,
-    *ATTITUDE_SIGNALS,
-    *RATE_SIGNALS,
-    *SURFACE_SIGNALS,
-    *THROTTLE_SIGNALS,
-)
 
 
 @pytest.fixture(scope="module", params=["nominal_di", "neuro_adaptive_di"])
@@ -49,20 +41,21 @@ def bag(request, tmp_path_factory):
 def test_every_recorded_value_is_there(bag):
     flight, record = bag_dataset(bag), read_bag(bag)
     assert flight["time"].values.tolist() == record.time.tolist()
-    arrays = [
-        record.states,
-        record.attitude_commands,
-        record.rate_commands,
-        record.surfaces,
-        record.throttle[:, None],
-    ]
-    signals = [*RECORDED]
+    arrays = {
+        STATE: record.states,
+        ATTITUDE_COMMAND: record.attitude_commands,
+        RATE_COMMAND: record.rate_commands,
+        SURFACE_COMMAND: record.surfaces,
+        THROTTLE_COMMAND: record.throttle[:, None],
+    }
     if record.learner is not None:
-        arrays += [record.learner, record.estimates]
-        signals += [*LEARNER_SIGNALS, *ESTIMATE_SIGNALS]
-    assert set(flight) == {signal.name for signal in (*signals, *AIR_SIGNALS)}
-    for signal, column in zip(signals, np.hstack(arrays).T, strict=True):
-        assert flight[signal.name].values.tobytes() == column.tobytes(), signal.name
+        arrays |= {LEARNER: record.learner, DISTURBANCE_ESTIMATE: record.estimates}
+    for topic, array in arrays.items():
+        recorded = [one.name for one in QUANTITIES if one.topic is topic]
+        assert len(recorded) == array.shape[1]
+        for name, column in zip(recorded, array.T, strict=True):
+            assert flight[name].values.tobytes() == column.tobytes(), name
+    assert set(flight) == {one.name for one in QUANTITIES if one.values(record) is not None}
 
 
 def test_derived_signals_are_those_of_the_laws(bag):
@@ -81,18 +74,18 @@ def test_every_signal_says_what_it_is(bag):
         assert signal.attrs["units"] and signal.attrs["long_name"] and signal.attrs["source"]
 
 
-def test_units_and_frames_are_those_of_the_topics():
-    groups = [STATE_SIGNALS, ATTITUDE_SIGNALS, RATE_SIGNALS, SURFACE_SIGNALS, THROTTLE_SIGNALS]
-    for topic, signals in zip(LOOP_TOPICS, groups, strict=False):
-        assert {signal.source for signal in signals} == {topic.name}
+def test_units_and_fields_are_those_of_the_topics():
+    for topic in (STATE, ATTITUDE_COMMAND, RATE_COMMAND, SURFACE_COMMAND, THROTTLE_COMMAND):
+        recorded = [one for one in QUANTITIES if one.topic is topic]
         units = topic.units.split(", ")
-        assert [signal.units for signal in signals] == units * (len(signals) // len(units))
-    names = [signal.name for signal in LEARNER_SIGNALS]
+        assert [one.unit for one in recorded] == units * (len(recorded) // len(units))
+        assert [one.index for one in recorded] == list(range(len(topic.layout.fields)))
+    names = [one.name for one in QUANTITIES if one.topic is LEARNER]
     assert names == [name.replace(".", "_") for name in LEARNER_NAMES]
 
 
 def test_units_of_the_learner_follow_from_those_of_its_basis():
-    units = {signal.name: signal.units for signal in (*LEARNER_SIGNALS, *ESTIMATE_SIGNALS)}
+    units = {one.name: one.unit for one in QUANTITIES}
     assert {units[f"{plant}_{rate}"] for plant in ("X_a", "X_d") for rate in "PQR"} == {"rad/s"}
     assert {units[f"d_{rate}"] for rate in "PQR"} == {"rad/s^2"}
     for term in BASIS_NAMES:

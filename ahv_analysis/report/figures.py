@@ -14,17 +14,32 @@ from matplotlib.figure import Figure
 
 from ahv_analysis.bag.record import Array, FlightRecord
 from ahv_analysis.interrupt import signals_wait
+from ahv_analysis.quantities import Quantity, of_plate
 from ahv_analysis.report.drawn import drawn, drawn_time
-from ahv_plant.model.constants import DEGREES, UNSTART_ALPHA
+from ahv_plant.model.constants import DEGREES
 
 
 class Panel(NamedTuple):
     """One axes of a figure."""
 
-    label: str
-    values: Callable[[FlightRecord], Array]
-    command: Callable[[FlightRecord], Array] | None = None
-    bound: float | None = None  # drawn at plus and minus, where it comes into view
+    quantity: Quantity
+    unit: str  # of SCALES; empty: the one that people are shown elsewhere
+
+    def values(self, record: FlightRecord) -> Array:
+        """Values (N+1,) in the unit of the panel."""
+        values = self.quantity.drawn(record, self.unit)
+        assert values is not None, self.quantity.name
+        return values
+
+    def command(self, record: FlightRecord) -> Array | None:
+        """Recorded command (N+1,) in the unit of the panel."""
+        return self.quantity.drawn_reference(record, None, self.unit)
+
+    @property
+    def bound(self) -> float | None:
+        """Bound at plus and minus that is always in view."""
+        bounds = self.quantity.drawn_bounds(None)
+        return bounds[1] if bounds and self.quantity.name in IN_VIEW else None
 
 
 class Plate(NamedTuple):
@@ -35,79 +50,20 @@ class Plate(NamedTuple):
     panels: Sequence[Panel]
 
 
-def _state(label: str, name: str, scale: float = 1.0) -> Panel:
-    return Panel(label, lambda record: record.column(name) * scale)
+UNITS = {"h": "km", "mass": "t"}  # of the report's figures
+IN_VIEW = {"alpha"}  # quantities whose bounds a figure of several flights shows
 
 
-def _angle(label: str, name: str, index: int) -> Panel:
-    return Panel(
-        label,
-        lambda record: record.column(name) * DEGREES,
-        lambda record: record.attitude_commands[:, index] * DEGREES,
-    )
+def _subject(title: str, plate: str) -> tuple[str, Sequence[Panel]]:
+    return title, [Panel(one, UNITS.get(one.name, "")) for one in of_plate(plate)]
 
 
-def _rate(label: str, name: str, index: int) -> Panel:
-    return Panel(
-        label,
-        lambda record: record.column(name) * DEGREES,
-        lambda record: record.rate_commands[:, index] * DEGREES,
-    )
-
-
-def _surface(label: str, index: int) -> Panel:
-    return Panel(label, lambda record: record.surfaces[:, index] * DEGREES)
-
-
-AIR = (
-    "Mach number, angle of attack and sideslip angle",
-    (
-        Panel("$M$ [-]", lambda record: record.air.mach),
-        Panel(
-            r"$\alpha$ [deg]",
-            lambda record: record.air.alpha * DEGREES,
-            bound=UNSTART_ALPHA * DEGREES,
-        ),
-        Panel(r"$\beta$ [deg]", lambda record: record.air.beta * DEGREES),
-    ),
-)
-VELOCITY = (
-    "Velocity components",
-    (_state("$u$ [m/s]", "u"), _state("$v$ [m/s]", "v"), _state("$w$ [m/s]", "w")),
-)
-PATH = (
-    "Altitude, mass and flight path angle",
-    (
-        _state("$h$ [km]", "h", 1e-3),
-        _state("$M_v$ [t]", "mass", 1e-3),
-        Panel(r"$\gamma$ [deg]", lambda record: record.climb_angle * DEGREES),
-    ),
-)
-ATTITUDE = (
-    "Roll, pitch and yaw angle",
-    (
-        _angle(r"$\phi$ [deg]", "phi", 0),
-        _angle(r"$\theta$ [deg]", "theta", 1),
-        _angle(r"$\psi$ [deg]", "psi", 2),
-    ),
-)
-RATES = (
-    "Roll, pitch and yaw rate",
-    (
-        _rate("$P$ [deg/s]", "P", 0),
-        _rate("$Q$ [deg/s]", "Q", 1),
-        _rate("$R$ [deg/s]", "R", 2),
-    ),
-)
-CONTROLS = (
-    "Controls",
-    (
-        _surface(r"$\delta_e$ [deg]", 0),
-        _surface(r"$\delta_a$ [deg]", 1),
-        _surface(r"$\delta_r$ [deg]", 2),
-        Panel(r"$\sigma_T$ [-]", lambda record: record.throttle),
-    ),
-)
+AIR = _subject("Mach number, angle of attack and sideslip angle", "air")
+VELOCITY = _subject("Velocity components", "velocity")
+PATH = _subject("Altitude, mass and flight path angle", "path")
+ATTITUDE = _subject("Roll, pitch and yaw angle", "attitude")
+RATES = _subject("Roll, pitch and yaw rate", "rates")
+CONTROLS = _subject("Controls", "controls")
 # Figures of a chapter, from its first number on; of single flights, then of campaigns.
 CHAPTER_3 = tuple(
     Plate(f"3.{number}", *subject)
@@ -175,8 +131,9 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
                     axis.plot(time[-1], values[-1], "x", color=COLOURS[label])
                 if label == subject or not lost:
                     seen.append(values)
-                if panel.command is not None and label == subject:
-                    command = drawn(flown, panel.command(record)[:end])
+                commanded = panel.command(record) if label == subject else None
+                if commanded is not None:
+                    command = drawn(flown, commanded[:end])
                     axis.plot(time, command, label="command", **COMMAND_STYLE)
                     seen.append(command)
             _scale(axis, np.concatenate(seen), panel.bound if len(flights) > 1 else None)
@@ -185,15 +142,17 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
                 for bound in (-panel.bound, panel.bound):
                     if low < bound < high:
                         axis.axhline(bound, color="0.4", linestyle=":", linewidth=1.0)
-            axis.set_ylabel(panel.label)
+            axis.set_ylabel(panel.quantity.label(panel.unit))
         axes[-1].set_xlabel("time [s]")
         axes[-1].margins(x=0)
         figure.suptitle(f"Figure {plate.number}: {plate.title}", fontsize=10, x=0.02, ha="left")
         figure.align_ylabels(axes)
         figure.tight_layout(rect=(0, 0, 1, 0.97 if len(flights) > 1 else 1))
-        if len(flights) > 1 or any(panel.command for panel in plate.panels):
+        handles, labels = axes[0].get_legend_handles_labels()
+        if len(labels) > 1:
             figure.legend(
-                *axes[0].get_legend_handles_labels(),
+                handles,
+                labels,
                 loc="upper left",
                 bbox_to_anchor=(0.01, 0.955 + 0.003 * len(plate.panels)),
                 ncols=4,
@@ -230,7 +189,7 @@ def draw_campaign(plate: Plate, flights: Sequence[FlightRecord], failed: Sequenc
             if panel.bound is not None:
                 for bound in (-panel.bound, panel.bound):
                     axis.axhline(bound, color="0.4", linestyle=":", linewidth=1.0)
-            axis.set_ylabel(panel.label)
+            axis.set_ylabel(panel.quantity.label(panel.unit))
         axes[-1].set_xlabel("time [s]")
         axes[-1].margins(x=0)
         title = f"Figure {plate.number}: {plate.title}, {len(flights)} runs, {sum(failed)} failed"

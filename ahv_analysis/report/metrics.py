@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ahv_analysis.bag.record import Array, FlightRecord
 from ahv_analysis.flight.case import Case
-from ahv_analysis.report.signals import AXES, CONTROLS, TRACKED, Settings
+from ahv_analysis.quantities import AXES, CONTROLS, TRACKED, Settings
 from ahv_plant.model.constants import DEGREES, STEP, STEP_NS, UNSTART_ALPHA
 from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.termination import termination_reason
@@ -194,16 +194,16 @@ def measure(record: FlightRecord, settings: Settings) -> dict[str, Any]:
     """
     time = record.time
     tracked: dict[str, Any] = {}
-    for signal in TRACKED:
-        command, values = signal.reference(record, settings), signal.values(record)
-        assert values is not None and signal.band is not None
+    for one in TRACKED:
+        command, values = one.drawn_reference(record, settings), one.drawn(record)
+        assert values is not None and one.band is not None
         if command is not None:
-            tracked[signal.name] = tracking(time, values - command, signal.band)._asdict()
+            tracked[one.words] = tracking(time, values - command, one.band)._asdict()
     controls: dict[str, Any] = {}
-    for signal in CONTROLS:
-        values, stops = signal.values(record), signal.bounds(settings)
+    for one in CONTROLS:
+        values, stops = one.drawn(record), one.drawn_bounds(settings)
         assert values is not None and stops is not None
-        controls[signal.name] = use(time, values, stops)._asdict()
+        controls[one.words] = use(time, values, stops)._asdict()
     learned = learning(record)
     return _finite(
         {

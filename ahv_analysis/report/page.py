@@ -15,16 +15,27 @@ from matplotlib import pyplot
 
 from ahv_analysis.bag.info import refused_words
 from ahv_analysis.bag.record import Array
+from ahv_analysis.quantities import AXES, CONTROLS, TRACKED, Quantity, of_group
 from ahv_analysis.report.drawn import EXACT, drawn, drawn_time, thinned_to
 from ahv_analysis.report.page_figures import flight_figures
 from ahv_analysis.report.page_flight import Flight
-from ahv_analysis.report.signals import AXES, CONTROLS, GROUPS, TRACKED, Group, Signal
 from ahv_msgs_py.graph import NODES, case_nodes
 from ahv_msgs_py.parameters import Value
 from ahv_plant.model.constants import STEP
 
 PAGE = "template"  # folder of template, style, script and plotting library
 NONE = "–"  # of what does not apply
+
+
+# Headings of the page, in their order.
+GROUPS = ("Path", "Air and mass", "Attitude", "Rates", "Controls", "Learner")
+
+
+class Group(NamedTuple):
+    """Quantities that stand under one heading."""
+
+    title: str
+    quantities: tuple[Quantity, ...]
 
 
 class Row(NamedTuple):
@@ -64,6 +75,11 @@ def number(value: float | None) -> str:
     return text.replace("-", "−").replace(",", "\u202f")
 
 
+def symbol(text: str) -> str:
+    """Write a symbol on one line."""
+    return text.replace("_", "").replace("^", "")
+
+
 def seconds(value: float | None, never: str = NONE) -> str:
     """Write a time [s] to the step."""
     return never if value is None else f"{value:.2f}".rstrip("0").rstrip(".") + " s"
@@ -85,7 +101,12 @@ def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    environment.filters |= {"number": number, "seconds": seconds, "setting": setting}
+    environment.filters |= {
+        "number": number,
+        "seconds": seconds,
+        "symbol": symbol,
+        "setting": setting,
+    }
     folder = files(__package__) / PAGE
     names = ("page.css", "page.js", "uPlot.min.css", "uPlot.iife.min.js", "uPlot.LICENSE")
     return environment.get_template("page.html").render(
@@ -137,27 +158,33 @@ def _compared(flights: Sequence[Flight]) -> Iterator[tuple[str, list[Row]]]:
         return Row(name, unit, values)
 
     for title, field in (("RMS error", "rms"), ("Overshoot", "overshoot")):
-        yield title, [row(one.name, one.unit, "tracking", one.name, field) for one in TRACKED]
+        yield (
+            title,
+            [row(one.words, one.shown_unit, "tracking", one.words, field) for one in TRACKED],
+        )
     settled = partial(seconds, never="not yet")
     yield (
         "Settled",
-        [row(one.name, "", "tracking", one.name, "settling_s", form=settled) for one in TRACKED],
+        [row(one.words, "", "tracking", one.words, "settling_s", form=settled) for one in TRACKED],
     )
-    efforts = [f"{one.unit}²·s" if one.unit else "s" for one in CONTROLS]
+    efforts = [f"{one.shown_unit}²·s" if one.shown_unit else "s" for one in CONTROLS]
     yield (
         "Control effort",
         [
-            row(one.name, unit, "controls", one.name, "effort")
+            row(one.words, unit, "controls", one.words, "effort")
             for one, unit in zip(CONTROLS, efforts, strict=True)
         ],
     )
     yield (
         "Control travel",
-        [row(one.name, one.unit, "controls", one.name, "travel") for one in CONTROLS],
+        [row(one.words, one.shown_unit, "controls", one.words, "travel") for one in CONTROLS],
     )
     yield (
         "At a stop",
-        [row(one.name, "", "controls", one.name, "saturated_s", form=seconds) for one in CONTROLS],
+        [
+            row(one.words, "", "controls", one.words, "saturated_s", form=seconds)
+            for one in CONTROLS
+        ],
     )
     yield (
         "Margin to inlet unstart",
@@ -176,15 +203,15 @@ def _compared(flights: Sequence[Flight]) -> Iterator[tuple[str, list[Row]]]:
 
 
 def _groups(flights: Sequence[Flight]) -> Iterator[Group]:
-    """Groups of the signals that any of the flights has."""
-    for group in GROUPS:
-        signals = tuple(
-            signal
-            for signal in group.signals
-            if any(signal.values(flight.record) is not None for flight in flights)
+    """Groups of the quantities that any of the flights has."""
+    for title in GROUPS:
+        quantities = tuple(
+            one
+            for one in of_group(title)
+            if any(one.values(flight.record) is not None for flight in flights)
         )
-        if signals:
-            yield Group(group.title, signals)
+        if quantities:
+            yield Group(title, quantities)
 
 
 def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
@@ -215,29 +242,27 @@ def _data(flights: Sequence[Flight]) -> str:
             }
             for flight in flights
         ],
-        "plots": [
-            _plot(signal, flights) for group in _groups(flights) for signal in group.signals
-        ],
+        "plots": [_plot(one, flights) for group in _groups(flights) for one in group.quantities],
     }
     return json.dumps(content, allow_nan=False).replace("<", "\\u003c")
 
 
-def _plot(signal: Signal, flights: Sequence[Flight]) -> dict[str, Any]:
-    bounds = {signal.bounds(flight.settings) for flight in flights} - {None}
+def _plot(one: Quantity, flights: Sequence[Flight]) -> dict[str, Any]:
+    bounds = {one.drawn_bounds(flight.settings) for flight in flights} - {None}
     lines = []
     for index, flight in enumerate(flights):
-        values, time = signal.values(flight.record), flight.record.time
+        values, time = one.drawn(flight.record), flight.record.time
         if values is None:
             continue
         lines.append({"flight": index, "reference": False, "values": _encode(drawn(time, values))})
-        reference = signal.reference(flight.record, flight.settings)
+        reference = one.drawn_reference(flight.record, flight.settings)
         if reference is not None:
             lines.append(
                 {"flight": index, "reference": True, "values": _encode(drawn(time, reference))}
             )
     return {
-        "name": signal.name,
-        "referenceName": signal.reference_name,
+        "name": one.words,
+        "referenceName": one.reference_words,
         "bounds": bounds.pop() if len(bounds) == 1 else None,
         "lines": lines,
     }
