@@ -20,11 +20,13 @@ from launch_ros.actions import Node
 
 from ahv_msgs_py.graph import controllers
 
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 DRAIN = 2.0  # [s] for the recorder to take what is still under way
 ARGUMENTS = {
     "case": ("nominal_di", "Name of a case in share/ahv/config/cases, or path of a YAML file."),
     "dispersion": ("", "YAML file of the vehicle's dispersion; that of the case, if empty."),
     "realtime": ("false", "true: 100 Hz by the wall clock; false: lockstep, as fast as it goes."),
+    "network": ("false", "true: other machines hear the graph and speak to it; false: none does."),
     "record": ("true", "Whether a recorder flies along."),
     "out": ("flight", "Folder for the bag, which must not have one: OUT/bag."),
     "autostart": ("true", "false: the nodes wait for `ros2 lifecycle set NODE configure`."),
@@ -45,6 +47,8 @@ def _nodes(context: LaunchContext) -> list[Node]:
     case = _case_file(given["case"])
     realtime, record = _truth(given, "realtime"), _truth(given, "record")
     shell = {"realtime": realtime, "autostart": _truth(given, "autostart")}
+    # nodes keep to the loopback interface by themselves, unless a range is set
+    wide = {"additional_env": {RANGE: "SUBNET"}} if _truth(given, "network") else {}
     names = controllers(_adaptive(case))
     plant = [_file(given["dispersion"])] if given["dispersion"] else []
     plant += [shell | {"listeners": len(names) + record}]
@@ -54,11 +58,11 @@ def _nodes(context: LaunchContext) -> list[Node]:
     if record:
         # in real time a flight goes on without its recorder
         end = {} if realtime else {"on_exit": Shutdown(reason="the recorder ended")}
-        nodes += [_node("recorder", [case, shell | {"bag": bag}], **end)]
+        nodes += [_node("recorder", [case, shell | {"bag": bag}], **end, **wide)]
     for name in names:
         end = {"respawn": True} if realtime else {"on_exit": Shutdown(reason=f"{name} ended")}
-        nodes += [_node(name, [case, shell], **end)]
-    return [*nodes, _node("plant", [case, *plant], on_exit=over)]
+        nodes += [_node(name, [case, shell], **end, **wide)]
+    return [*nodes, _node("plant", [case, *plant], on_exit=over, **wide)]
 
 
 def _truth(given: dict[str, str], name: str) -> bool:

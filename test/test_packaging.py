@@ -16,6 +16,7 @@ import pytest
 
 from ahv_analysis.flight.case import case_names, load_case
 from ahv_msgs_py.graph import NODES, controllers
+from ahv_msgs_py.node.network import DISCOVERY_RANGE
 from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 
 ROOT = Path(__file__).parent.parent
@@ -227,6 +228,12 @@ def test_launch_in_real_time_starts_controllers_again(launch, tmp_path):
     assert all(nodes[name].respawn for name in CONTROLLERS)
     assert nodes["plant"].parameters[1] == str(dispersion)
     assert nodes["plant"].parameters[2] == LOCKSTEP | {"realtime": True, "listeners": 3}
+
+
+def test_launch_keeps_to_this_machine_unless_it_is_told_otherwise(launch):
+    assert not any(hasattr(node, "additional_env") for node in launch().values())
+    for node in launch(network="true").values():
+        assert node.additional_env == {DISCOVERY_RANGE: "SUBNET"}
 
 
 def test_launch_names_what_is_neither_true_nor_false(launch):

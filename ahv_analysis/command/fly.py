@@ -2,6 +2,7 @@
 """The command `ahv fly`."""
 
 import json
+import os
 import time
 from collections.abc import Callable
 from enum import StrEnum
@@ -25,6 +26,7 @@ from ahv_analysis.command.console import (
 )
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.interrupt import interrupted_says, signals_wait
+from ahv_msgs_py.node.network import DISCOVERY_RANGE
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP, STEP_NS
 
@@ -61,6 +63,9 @@ def fly(
     processes: Annotated[
         bool, typer.Option("--processes", help="One process per node, not all nodes in one.")
     ] = False,
+    network: Annotated[
+        bool, typer.Option("--network", help="Let other machines hear the graph, and speak to it.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for the bag and the summary, which must not have them."),
@@ -89,8 +94,10 @@ def fly(
     from ahv_analysis.flight.library import fly_library
     from ahv_analysis.flight.summary import missing_states, summarize
 
-    if engine == Engine.library and (realtime or processes):
-        raise UsageError("--realtime and --processes are for the graph, not for --engine library")
+    if engine == Engine.library and (realtime or processes or network):
+        raise UsageError(
+            "--realtime, --processes and --network are for the graph, not for --engine library"
+        )
     changes, draw = _dispersion(dispersion, seed, run)
     if duration is not None:
         changes["duration"] = duration
@@ -105,6 +112,8 @@ def fly(
         interrupted_says(partial(_what_is_left, progress, bag))
         if engine == Engine.graph:
             check_domain()
+            if network:
+                os.environ.setdefault(DISCOVERY_RANGE, "SUBNET")
             fly_ros = _engine(processes)
             ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
         else:
