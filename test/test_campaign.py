@@ -28,7 +28,7 @@ from ahv_analysis.campaign.campaign import (
 )
 from ahv_analysis.campaign.store import PART_RUNS, level_folder, part_files
 from ahv_analysis.campaign.summary import exact_interval, summarize_campaign
-from ahv_analysis.campaign.table import CONTROLLERS, REPORT, fly_table, markdown
+from ahv_analysis.campaign.table import CONTROLLERS, REPORT, Row, fly_table, markdown
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.outcome import Cause
@@ -346,6 +346,21 @@ def test_the_table_has_the_report_s_counts(tmp_path):
     text = markdown(rows)
     assert text.count("\n") == 2 + 8
     assert "| 99.39 | [99.08, 99.6" in text and "| 89.21 | [88.19, 90.1" in text
+
+
+@pytest.mark.parametrize(
+    "successes, runs, verdict",
+    [
+        (3, 3, "within"),  # of three flights nothing follows
+        (3602, 3602, "above"),
+        (3594, 3602, "within"),
+        (3560, 3602, "below"),
+        (0, 3, "below"),
+    ],
+)
+def test_a_rate_is_apart_only_if_neither_lies_in_the_other_s_interval(successes, runs, verdict):
+    flown = {"success_rate": successes / runs, "interval": exact_interval(successes, runs)}
+    assert Row(3602, 3594, exact_interval(3594, 3602), flown).verdict == verdict
 
 
 @pytest.fixture(scope="module")
