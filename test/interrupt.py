@@ -17,6 +17,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from ahv_analysis.bag.reader import read_bag
+from ahv_msgs_py.layout import NANOSECONDS
+
 AHV = str(Path(sys.executable).parent / "ahv")
 LONGEST_END = 10.0  # [s] from the signal on
 ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -97,8 +100,6 @@ def _listen(terminal, said, seconds):
 
 def fault(end, how, bag):
     """What is wrong with an end, empty if nothing is."""
-    from ahv_analysis.bag.reader import read_bag
-
     sentences = [line for line in end.said.splitlines() if "ahv: interrupted" in line]
     if end.code != 128 + NUMBERS[how]:
         return f"exit code {end.code}"
@@ -111,9 +112,9 @@ def fault(end, how, bag):
             return "the bag is not whole"
         if "before the flight began" not in sentences[0]:
             flown = float(re.search(r"at ([0-9.]+) s; what was flown is in ", sentences[0])[1])
-            steps = read_bag(bag).steps
-            if not -30 <= steps - flown * 100 <= 30:  # of which the last are under way
-                return f"{steps} steps, but it says {flown} s"
+            last = read_bag(bag).stamps[-1] / NANOSECONDS
+            if abs(last - flown) > 0.5:  # of which the last is under way
+                return f"the bag ends at {last} s, but it says {flown} s"
     return ""
 
 
