@@ -249,8 +249,11 @@ def fly_processes(
     keep_to_this_machine(shared_memory=not realtime)
     log_where_it_can()
     graph = ProcessGraph(case, bag, realtime)
-    with signals_wait() as interrupted, graph:
-        return _watch(graph, realtime, progress, interrupted)
+    with signals_wait() as interrupted:
+        with graph:
+            flown = _watch(graph, realtime, progress, interrupted)
+        progress(graph.report.step)  # it goes on until its processes have heard of an interruption
+        return flown
 
 
 def _watch(
