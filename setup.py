@@ -47,7 +47,7 @@ setup(
     install_requires=[
         "setuptools",
         "numpy",  # arrays of flights
-        "scipy",  # trim solver, rotations
+        "scipy",  # intervals of success rates, rotations
         "numba>=0.60",  # the vehicle and the laws at machine speed
         "mcap",  # records of MCAP files; brings zstandard and lz4, which compress their chunks
         "rosbags>=0.11",  # message definitions and quality of service, without a ROS installation

@@ -10,5 +10,9 @@ class CampaignError(Exception):
     """A campaign that cannot be flown as asked, or is not one."""
 
 
+class CampaignStopped(Exception):
+    """A campaign that was not flown to its end; what was flown is kept."""
+
+
 class GraphError(Exception):
     """A graph that did not do what a graph must."""

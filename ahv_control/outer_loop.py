@@ -5,7 +5,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ahv_plant.model.vectors import Attitude, State, clamp
-from ahv_plant.numerics.elementary import asin, atan_ratio, sin_cos
+from ahv_plant.numerics.elementary import asin, atan2, sin_cos
 from ahv_plant.numerics.elementwise import elementwise
 
 
@@ -31,7 +31,7 @@ def attitude_command(state: State, settings: OuterLoop) -> Attitude:
     sin_phi, cos_phi = sin_cos(state.phi)
     B = state.v * sin_phi + state.w * cos_phi
     climb = settings.k_h * (settings.altitude - state.h)
-    alpha = atan_ratio(B, state.u)  # in the vertical plane
+    alpha = atan2(B, state.u)  # in the vertical plane
     theta = alpha + asin(climb / sqrt(state.u * state.u + B * B))
     climb_angle = state.theta - alpha
     limit = settings.alpha_limit

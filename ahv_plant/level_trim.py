@@ -17,6 +17,8 @@ from ahv_plant.numerics.elementwise import elementwise, select
 from ahv_plant.vehicle import state_rate
 
 DIFFERENCE = 1e-6  # [rad] of the finite-difference Jacobian
+START = (0.05, -0.12)  # [rad] angle of attack and elevons that the search begins with
+NEWTON_STEPS = 10
 TOLERANCE = 1e-6  # [m/s^2, rad/s^2] of a trim
 
 
@@ -63,8 +65,8 @@ def level_trim(altitude: float, speed: float, mass: float, truth: Truth) -> Leve
     The seven equations in two unknowns: v, P, R and the rudder are zero by symmetry, pitch is the
     angle of attack in level flight, and the throttle follows.
     """
-    alpha, elevon = trim_step(0.05, -0.12, altitude, speed, mass, truth)
-    for _ in range(9):
+    alpha, elevon = trim_step(START[0], START[1], altitude, speed, mass, truth)
+    for _ in range(NEWTON_STEPS - 1):
         alpha, elevon = trim_step(alpha, elevon, altitude, speed, mass, truth)
     w, Q, throttle = balance(alpha, elevon, altitude, speed, mass, truth)
     found = (abs(w) < TOLERANCE) & (abs(Q) < TOLERANCE)

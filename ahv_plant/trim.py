@@ -1,13 +1,11 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Trimmed cruise flight: the seven equations of section 3.5.1."""
 
-from math import atan2
+from math import pi, tan
 from typing import NamedTuple
 
-import numpy as np
-from scipy.optimize import root
-
 from ahv_plant.dispersion import NOMINAL, Truth
+from ahv_plant.level_trim import NEWTON_STEPS, START, balance, trim_step
 from ahv_plant.model.aerodynamics import MACH_MINIMUM
 from ahv_plant.model.atmosphere import (
     ALTITUDE_MAXIMUM,
@@ -24,6 +22,8 @@ CRUISE_ALTITUDE = 24_000.0  # [m] h*, section 3.5.1
 CRUISE_SPEED = 1786.4  # [m/s] u*, section 3.5.1
 MACH_MAXIMUM = 24.0  # [-] end of the wind-tunnel and code data behind the fits
 RESIDUAL_TOLERANCE = 1e-9  # [m/s^2, rad/s^2, m/s]
+TRIMMED = ("u", "v", "w", "P", "Q", "R", "h")  # whose rates vanish
+CONTINUATION = (1, 8, 64)  # steps from the cruise condition, more where fewer do not arrive
 
 
 class Trim(NamedTuple):
@@ -71,31 +71,29 @@ def trim(
 ) -> Trim:
     """Level flight at `altitude` [m], u = `speed` [m/s] and `mass` [kg], section 3.5.1.
 
-    Solves the rates of u, v, w, P, Q, R and h for v, w, theta, the three surfaces and sigma_T, all
-    other states being zero, of the true vehicle `truth`. Raises ValueError outside the range of
-    the model.
+    By symmetry v, P, R and the rudder are zero, and in level flight the pitch is the angle of
+    attack: what is left of the seven equations is solved as in `level_trim`. Where its start is
+    too far off, by continuation: from the cruise condition there in ever smaller steps, each from
+    where the one before ended. The rates of u, v, w, P, Q, R and h at the end, of the true vehicle
+    `truth`, are the residual. Raises ValueError outside the range of the model.
     """
     check_flight_condition(altitude, speed, mass, truth.geometric)
-
-    def flight(unknowns: np.ndarray) -> tuple[State, Surfaces, float]:
-        v, w, theta, right, left, rudder, throttle = (float(value) for value in unknowns)
-        state = State(speed, v, w, 0.0, 0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0, altitude, mass)
-        return state, Surfaces(right, left, rudder), throttle
-
-    def residuals(unknowns: np.ndarray) -> list[float]:
-        rate = state_rate(*flight(unknowns), 0.0, truth)
-        return [rate.u, rate.v, rate.w, rate.P, rate.Q, rate.R, rate.h]
-
-    guess = [0.0, 0.05 * speed, 0.05, -0.1, -0.1, 0.0, 0.2]
-    solution = root(residuals, guess, tol=1e-14)
-    state, surfaces, throttle = flight(solution.x)
-    residual = float(np.max(np.abs(solution.fun)))
-    return Trim(
-        state,
-        surfaces,
-        throttle,
-        atan2(state.w, state.u),
-        residual,
-        residual < RESIDUAL_TOLERANCE,
-        limit_surfaces(surfaces) == surfaces and limit_throttle(throttle) == throttle,
-    )
+    for steps in CONTINUATION:
+        alpha, elevon = START
+        for step in range(1, steps + 1):
+            share = step / steps
+            h = CRUISE_ALTITUDE + share * (altitude - CRUISE_ALTITUDE)
+            u = CRUISE_SPEED + share * (speed - CRUISE_SPEED)
+            for _ in range(NEWTON_STEPS):
+                alpha, elevon = trim_step(alpha, elevon, h, u, mass, truth)
+        _, _, throttle = balance(alpha, elevon, altitude, speed, mass, truth)
+        w = speed * tan(alpha)
+        state = State(speed, 0.0, w, 0.0, 0.0, 0.0, 0.0, alpha, 0.0, 0.0, 0.0, altitude, mass)
+        surfaces = Surfaces(elevon, elevon, 0.0)
+        rate = state_rate(state, surfaces, throttle, 0.0, truth)
+        residual = max(abs(rate[State._fields.index(name)]) for name in TRIMMED)
+        converged = residual < RESIDUAL_TOLERANCE and abs(alpha) < pi / 2
+        if converged:
+            break
+    within = limit_surfaces(surfaces) == surfaces and limit_throttle(throttle) == throttle
+    return Trim(state, surfaces, throttle, alpha, residual, converged, within)

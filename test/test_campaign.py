@@ -3,7 +3,9 @@
 
 import json
 import math
+import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,21 +21,31 @@ import pytest
 from matplotlib import pyplot
 from scipy.stats import beta
 
+from ahv_analysis.campaign import campaign as campaign_module
 from ahv_analysis.campaign.batch import fly_alone
 from ahv_analysis.campaign.campaign import (
+    COMPUTED_BY,
     Campaign,
     first_causes,
     fly_campaign,
     open_campaign,
 )
-from ahv_analysis.campaign.store import PART_RUNS, level_folder, part_files
+from ahv_analysis.campaign.store import (
+    PART_RUNS,
+    check_columns,
+    level_folder,
+    part_files,
+    read_part,
+    write_part,
+)
 from ahv_analysis.campaign.summary import exact_interval, summarize_campaign
 from ahv_analysis.campaign.table import CONTROLLERS, REPORT, Row, fly_table, markdown
-from ahv_analysis.errors import CampaignError
+from ahv_analysis.errors import CampaignError, CampaignStopped
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.outcome import Cause
 from ahv_analysis.report.page_figures import campaign_figures
 from ahv_msgs_py.config import config_folder
+from ahv_plant.numerics.identity import HOUSE
 from test.test_command import ahv
 
 RUNS = 150
@@ -67,6 +79,18 @@ def done(result):
     future: Future = Future()
     future.set_result(result)
     return future
+
+
+class Invented:
+    """An executor that makes up the results of long campaigns instead of flying them."""
+
+    def __init__(self, pattern):
+        self.pattern = pattern
+
+    def submit(self, function, described, first, count):
+        chosen = np.arange(first, first + count) % len(self.pattern["run"])
+        columns = {name: column[chosen] for name, column in self.pattern.items()}
+        return done(columns | {"run": np.arange(first, first + count)})
 
 
 @pytest.fixture(scope="module")
@@ -112,9 +136,9 @@ def test_an_interrupted_campaign_resumes(flown, tmp_path):
     class Interrupted(ThreadPoolExecutor):
         """An executor that is interrupted in its second job."""
 
-        def submit(self, function, campaign, first, count):
+        def submit(self, function, described, first, count):
             if first < 64:
-                return done(function(campaign, first, count))
+                return done(function(described, first, count))
             future: Future = Future()
             future.set_exception(KeyboardInterrupt())
             return future
@@ -141,18 +165,6 @@ def test_more_runs_add_to_a_campaign_and_fewer_are_a_part_of_it(flown, tmp_path)
     assert same(rows(tmp_path), flown[0])
 
 
-class Invented:
-    """An executor that makes up the results of long campaigns instead of flying them."""
-
-    def __init__(self, pattern):
-        self.pattern = pattern
-
-    def submit(self, function, campaign, first, count):
-        chosen = np.arange(first, first + count) % len(self.pattern["run"])
-        columns = {name: column[chosen] for name, column in self.pattern.items()}
-        return done(columns | {"run": np.arange(first, first + count)})
-
-
 def test_memory_does_not_grow_with_the_campaign(flown, tmp_path):
     """Peak of flying, resuming and summing up, with numpy's and Arrow's allocations."""
 
@@ -177,10 +189,10 @@ def test_a_long_campaign_is_one_table_of_parts(flown, tmp_path):
     class Interrupted(Invented):
         """Stops in the second part."""
 
-        def submit(self, function, campaign, first, count):
+        def submit(self, function, described, first, count):
             if first == PART_RUNS + 640:
                 raise KeyboardInterrupt
-            return super().submit(function, campaign, first, count)
+            return super().submit(function, described, first, count)
 
     long = campaign(runs=2 * PART_RUNS + 100)
     with pytest.raises(KeyboardInterrupt):
@@ -198,11 +210,89 @@ def test_a_long_campaign_is_one_table_of_parts(flown, tmp_path):
     assert [causes[run] for run in range(RUNS)] == flown[0]["cause"].tolist()
 
 
-@pytest.mark.parametrize("change", [{"seed": 3}, {"name": "neuro_adaptive_sc_gdi"}])
-def test_another_campaign_is_not_mixed_in(flown, change):
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"seed": 3}, "seed 2 there and 3 here"),
+        ({"name": "neuro_adaptive_sc_gdi"}, "case neuro_adaptive_di there"),
+    ],
+)
+def test_another_campaign_is_not_mixed_in(flown, change, words):
     _, folder = flown
-    with ThreadPoolExecutor(1) as pool, pytest.raises(CampaignError, match="another campaign"):
+    with (
+        ThreadPoolExecutor(1) as pool,
+        pytest.raises(CampaignError, match="another campaign") as e,
+    ):
         fly_campaign(campaign(**change), folder, pool)
+    assert words in str(e.value)
+
+
+@pytest.mark.parametrize("what", ["source", "numba", "llvmlite", "numpy", "processor"])
+def test_a_campaign_of_other_code_is_not_mixed_in(flown, monkeypatch, what):
+    other = COMPUTED_BY | {what: "another"}
+    monkeypatch.setattr(campaign_module, "COMPUTED_BY", other)
+    with (
+        ThreadPoolExecutor(1) as pool,
+        pytest.raises(CampaignError, match=f"{what} .* another here"),
+    ):
+        fly_campaign(campaign(), flown[1], pool)
+
+
+def test_a_worker_with_other_code_is_refused_by_name(tmp_path):
+    """A process whose air has another heat ratio; of a pool, or a dask worker without dask."""
+    house = tmp_path / "house"
+    for room in ("ahv_plant", "ahv_control", "ahv_msgs_py", "ahv_analysis"):
+        shutil.copytree(HOUSE / room, house / room, ignore=shutil.ignore_patterns("__pycache__"))
+    air = house / "ahv_plant" / "model" / "atmosphere.py"
+    text = air.read_text()
+    assert "HEAT_RATIO = 1.4 " in text
+    air.write_text(text.replace("HEAT_RATIO = 1.4 ", "HEAT_RATIO = 1.41 "))
+    program = (
+        "import json, sys\nfrom ahv_analysis.campaign.campaign import fly_job\n"
+        "print(fly_job(json.loads(sys.stdin.read()), 0, 64))"
+    )
+    worker = subprocess.run(
+        [sys.executable, "-c", program],
+        input=json.dumps(campaign().describe()),
+        env=os.environ | {"PYTHONPATH": str(house)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    refusal = worker.stdout.strip()
+    assert re.match(r"process \d+ on .* would compute other numbers \(source \w+ there", refusal)
+    assert COMPUTED_BY["source"] + " here" in refusal and "\n" not in refusal
+
+    class OtherCode:
+        """An executor of such a process."""
+
+        def submit(self, function, *arguments):
+            return done(refusal)
+
+    with pytest.raises(CampaignError) as error:
+        fly_campaign(campaign(), tmp_path / "campaign", OtherCode())
+    assert str(error.value) == refusal
+    assert not part_files(level_folder(tmp_path / "campaign", 0.4))
+
+
+def test_when_a_scheduler_dies_what_was_flown_is_kept(flown, tmp_path):
+    class Dead(Invented):
+        """An executor that gives up its second job."""
+
+        def submit(self, function, described, first, count):
+            future = super().submit(function, described, first, count)
+            if first:
+                future = Future()
+                future.cancel()
+                future.set_running_or_notify_cancel()
+            return future
+
+    with pytest.raises(
+        CampaignStopped, match="what was flown is kept, and the same command resumes"
+    ):
+        fly_campaign(campaign(), tmp_path, Dead(flown[0]))
+    assert rows(tmp_path)["run"].tolist() == list(range(64))
 
 
 def test_a_folder_gives_its_campaign_back(flown):
@@ -304,6 +394,56 @@ def test_two_levels_never_share_a_folder(tmp_path):
     names = {level_folder(tmp_path, level).name for level in (0.1234567, 0.12345671, 0.123457)}
     assert names == {"runs-0.1234567", "runs-0.12345671", "runs-0.123457"}
     assert level_folder(tmp_path, 0.0).name == "runs-0"  # as ever
+
+
+def test_a_flipped_bit_is_noticed_and_its_runs_are_flown_anew(flown, tmp_path):
+    folder = tmp_path / "campaign"
+    shutil.copytree(flown[1], folder)
+    (part,) = part_files(level_folder(folder, 0.4))
+    whole, good = part.read_bytes(), read_part(part)
+    draw = np.random.default_rng(1)
+    noticed = 0
+    for place, bit in zip(*draw.integers((len(whole), 8), size=(200, 2)).T, strict=True):
+        part.write_bytes(whole[:place] + bytes([whole[place] ^ (1 << bit)]) + whole[place + 1 :])
+        try:
+            columns, described = read_part(part)
+        except CampaignError as error:
+            noticed += 1
+            words = f"{part} is not the file of a campaign, or is damaged"
+            assert str(error).startswith(words) and "its runs are flown anew" in str(error)
+        else:  # in what Parquet keeps beside rows and description
+            assert same(columns, good[0]) and described == good[1]
+    assert noticed > 100
+    in_a_page = whole[:3000] + bytes([whole[3000] ^ 1]) + whole[3001:]
+    part.write_bytes(in_a_page)
+    with ThreadPoolExecutor(2) as pool, pytest.raises(CampaignError, match="damaged"):
+        fly_campaign(campaign(), folder, pool)
+    with pytest.raises(CampaignError, match="damaged"):
+        summarize_campaign(campaign(), folder)
+    part.unlink()
+    fly_campaign(campaign(), folder, Invented(flown[0]))
+    assert part.read_bytes() == whole
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("run", 9),
+        ("CL", -1.0),
+        ("cause", 5),
+        ("max_abs_phi_deg", -1.0),
+        ("final_altitude_m", 5e4),
+        ("final_speed_mps", math.nan),
+        ("trim_alpha_deg", 100.0),
+    ],
+)
+def test_a_value_that_cannot_be_is_named(flown, name, value):
+    columns = {key: column.copy() for key, column in flown[0].items()}
+    check_columns(columns, 0)
+    assert columns["trim_exists"][10]
+    columns[name][10] = value
+    with pytest.raises(ValueError, match=r"its runs" if name == "run" else f"{name} of run 10 is"):
+        check_columns(columns, 0)
 
 
 def test_a_level_without_runs_is_named(tmp_path):
@@ -411,6 +551,16 @@ def test_the_command_flies_reruns_and_draws(tmp_path):
     assert (summary["controller"], summary["level"]) == ("neuro_adaptive_di", 0.4)
     again = ahv("monte-carlo", "rerun", out, 6, "--json")
     assert json.loads(again.stdout)["same_bits"] is True, again.stdout
+    assert again.returncode == 0
+    (part,) = part_files(level_folder(out, 0.4))
+    columns, described = read_part(part)
+    columns = {name: column.copy() for name, column in columns.items()}
+    columns["final_altitude_m"][5] += 1e-9
+    write_part(part, [columns], described)
+    again = ahv("monte-carlo", "rerun", out, 5, "--json")
+    assert again.returncode == 1
+    assert json.loads(again.stdout)["differing"] == ["final_altitude_m"]
+    assert again.stderr.strip() == "ahv: run 5 differs from the campaign's in final_altitude_m"
     figures = ahv("figures", out, "--runs", 6, "--out", tmp_path / "figures", "--json")
     assert figures.returncode == 0, figures.stderr
     names = {Path(name).name for name in json.loads(figures.stdout)["figures"]}

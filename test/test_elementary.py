@@ -8,7 +8,16 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ahv_plant.numerics.elementary import asin, atan, exp_small, log_near_one, power, sin_cos
+from ahv_plant.numerics.elementary import (
+    asin,
+    atan,
+    atan2,
+    atan_ratio,
+    exp_small,
+    log_near_one,
+    power,
+    sin_cos,
+)
 from test.flights import between
 
 pytestmark = pytest.mark.unit
@@ -38,6 +47,19 @@ def test_sine_and_cosine(x):
 def test_arctangent(x):
     with mpmath.workdps(60):
         assert ulps(atan(x), mpmath.atan(x)) < 3
+
+
+@given(between(-3.0, 3.0), between(-3.0, 3.0))
+@example(1.0, 0.0)
+@example(-1.0, 0.0)
+@example(0.0, -1.0)
+@example(-1e-9, -7000.0)
+def test_arctangent_in_all_four_quadrants(y, x):
+    if x or y:
+        with mpmath.workdps(60):
+            assert ulps(atan2(y, x), mpmath.atan2(y, x)) < 3
+        if x > 0.0:
+            assert atan2(y, x).hex() == atan_ratio(y, x).hex()
 
 
 @given(between(-1.0, 1.0))

@@ -11,7 +11,6 @@ from numba.core import config
 from numba.core.errors import TypingError
 
 from ahv_plant.model.vectors import Surfaces
-from ahv_plant.numerics import elementwise as compiled
 from ahv_plant.numerics.elementwise import elementwise, kernel, select
 from ahv_plant.numerics.simd import LANES, load, store, widen
 
@@ -38,11 +37,10 @@ def flat(value):
 
 
 @pytest.fixture(scope="module")
-def in_lanes(tmp_path_factory):
+def in_lanes():
     """Run `operations` on rows of a, b, c; compiled here and now, even where nothing else is."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(config, "DISABLE_JIT", False)
-        patch.setattr(compiled, "_CACHE", tmp_path_factory.mktemp("cache"))
         inner = elementwise(operations)
 
         @kernel
@@ -69,9 +67,8 @@ def test_a_lane_computes_what_its_number_computes(in_lanes, rows):
         assert lane.tobytes() == expected.tobytes()
 
 
-def test_a_conditional_expression_is_refused_and_not_computed_wrongly(monkeypatch, tmp_path):
+def test_a_conditional_expression_is_refused_and_not_computed_wrongly(monkeypatch):
     monkeypatch.setattr(config, "DISABLE_JIT", False)
-    monkeypatch.setattr(compiled, "_CACHE", tmp_path)
 
     @kernel
     def run(rows, result):

@@ -47,6 +47,8 @@ for name, low, high in (("sin_cos", -50, 50), ("atan", -30, 30), ("asin", -1.2, 
                         ("log_near_one", 0.7, 1.4), ("exp_small", -9, 9)):
     function = getattr(elementary, name)
     show(name, tuple(function(draw.uniform(low, high)) for _ in range(3000)))
+pairs = [(draw.uniform(-3, 3), draw.uniform(-3, 3)) for _ in range(3000)]
+show("atan2", tuple(elementary.atan2(y, x) for y, x in pairs))
 for geometric in (False, True):
     show("atmosphere", tuple(atmosphere(draw.uniform(-1e3, 5e4), geometric) for _ in range(3000)))
 axis = AxisDisturbance(*(draw.uniform(-0.5, 0.5) for _ in AxisDisturbance._fields))
@@ -84,5 +86,5 @@ def test_plain_floats_and_compiled_code_agree_in_every_bit():
     cases = ["nominal_di", "neuro_adaptive_di", "neuro_adaptive_sc_gdi_protected"]
     compiled = run(cases, NUMBA_DISABLE_JIT="0")
     plain = run(cases, NUMBA_DISABLE_JIT="1")
-    assert len(compiled) == 22 + 5 + 2 + 500 + 201 * len(cases)
+    assert len(compiled) == 22 + 6 + 2 + 500 + 201 * len(cases)
     assert compiled == plain

@@ -1,8 +1,12 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Monte-Carlo campaigns: drawn flights on any executor, one row a run, resumed if stopped."""
 
+import os
+import platform
+import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -11,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from ahv_analysis.bag.record import Array
-from ahv_analysis.campaign.batch import find_trims, fly_batch
+from ahv_analysis.campaign.batch import find_trims, fly_alone, fly_batch
 from ahv_analysis.campaign.store import (
     PART_RUNS,
     Columns,
+    differences,
     level_folder,
     level_name,
     part_file,
@@ -23,14 +28,15 @@ from ahv_analysis.campaign.store import (
     read_parts,
     write_part,
 )
-from ahv_analysis.errors import CampaignError
+from ahv_analysis.errors import CampaignError, CampaignStopped
 from ahv_analysis.flight.case import Case, Draw, dispersion_parameters, make_case
 from ahv_analysis.flight.outcome import Outcome
+from ahv_analysis.versions import what_computes
 from ahv_plant.dispersion import Dispersion, draw_dispersion
-from ahv_plant.level_trim import LevelTrim
+from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
-from ahv_plant.numerics.elementwise import source_hash
+from ahv_plant.numerics.identity import Definition
 
 RUNS_PER_JOB = 64  # four batches: half a second of work, so that little is lost and little waits
 LOOK = 0.2  # [s] between looks for an interruption
@@ -43,6 +49,7 @@ START_SPREAD = {
     "initial.R": 5.0,  # [deg/s]
     "initial.h": 500.0,  # [m]
 }
+COMPUTED_BY = what_computes(Definition(Path(__file__).resolve(), "fly_runs"))
 
 
 @dataclass(frozen=True)
@@ -56,9 +63,9 @@ class Campaign:
     random_starts: bool = False
 
     def describe(self) -> dict[str, Any]:
-        """All that decides the result of a run: the code too, but not the number of runs."""
+        """All that decides a run: what computes it too, but not the number of runs."""
         return {
-            "source": source_hash(),
+            **COMPUTED_BY,
             "case": self.case.name,
             "level": self.level,
             "seed": self.seed,
@@ -102,16 +109,46 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
         case.plant.initial.mass,
         geometric,
     )
-    trim = LevelTrim(*trims.T)
-    return flight_columns(np.array(runs), dispersions, states, outcomes) | {
-        "trim_exists": trim.exists == 1.0,
-        "trim_alpha_deg": trim.alpha * DEGREES,
-    }
+    return _columns(np.array(runs), dispersions, states, outcomes, trims)
 
 
-def flight_columns(runs: Array, dispersions: Array, states: Array, outcomes: Array) -> Columns:
-    """Columns of the campaign's file that a flight gives."""
-    outcome = Outcome(*outcomes.T)
+def fly_again(campaign: Campaign, run: int) -> Columns:
+    """Fly one run by scalar code: the columns of its row, with the same bits."""
+    case = campaign.case_of(run)
+    control, (initial, steps, truth) = case.control, case.plant
+    outcome = fly_alone(initial, truth, control, steps)
+    calm = truth._replace(disturbance=None)
+    trim = level_trim(control.outer.altitude, control.velocity.speed, initial.mass, calm)
+    return _columns(*map(np.array, ([run], [truth.dispersion], [initial], [outcome], [trim])))
+
+
+def fly_job(described: dict[str, Any], first: int, count: int) -> Columns | str:
+    """Fly runs of the campaign that is `described`, in any process; or why this one must not.
+
+    A refusal is a result and no error, for executors try again elsewhere what is one.
+    """
+    differing = differences(described | COMPUTED_BY, described)
+    if differing:
+        return (
+            f"{_this_worker()} would compute other numbers ({differing}): "
+            "give it the code and the packages of this machine, and start it anew"
+        )
+    return fly_runs(_campaign_of(described, first + count), first, count)
+
+
+def _this_worker() -> str:
+    """Name this process, by its address if dask runs it."""
+    if "distributed" in sys.modules:
+        with suppress(ValueError):  # there is no worker in this process
+            return f"worker {sys.modules['distributed'].get_worker().address}"
+    return f"process {os.getpid()} on {platform.node()}"
+
+
+def _columns(
+    runs: Array, dispersions: Array, states: Array, outcomes: Array, trims: Array
+) -> Columns:
+    """Columns of the campaign's file."""
+    outcome, trim = Outcome(*outcomes.T), LevelTrim(*trims.T)
     table: Columns = {"run": runs}
     table |= {name: dispersions[:, i] for i, name in enumerate(Dispersion._fields)}
     table |= {
@@ -133,6 +170,8 @@ def flight_columns(runs: Array, dispersions: Array, states: Array, outcomes: Arr
         "max_observer_error_dps": outcome.max_observer_error * DEGREES,
         "final_altitude_m": outcome.final_altitude,
         "final_speed_mps": outcome.final_speed,
+        "trim_exists": trim.exists == 1.0,
+        "trim_alpha_deg": trim.alpha * DEGREES,
     }
 
 
@@ -149,7 +188,7 @@ def fly_campaign(
     the executor's to repeat. A part is written when all of it is flown. Once
     `interrupted()`, or by an error, it ends and the folder keeps what was flown. `progress(runs)`
     is called now and then. Raises CampaignError if the folder holds another campaign or cannot
-    hold any.
+    hold any, or if a worker would compute other numbers, CampaignStopped if the executor gives up.
     """
     kept = level_folder(folder, campaign.level)
     try:
@@ -163,18 +202,18 @@ def fly_campaign(
     progress(count)
     parts: dict[int, _Part] = {}
     jobs = _jobs(campaign, kept, parts)
-    under_way: dict[Future[Columns], int] = {}
+    under_way: dict[Future[Columns | str], int] = {}
     try:
         while not interrupted():
             for start, first, runs in islice(jobs, JOBS_UNDER_WAY - len(under_way)):
-                under_way[executor.submit(fly_runs, campaign, first, runs)] = start
+                under_way[executor.submit(fly_job, described, first, runs)] = start
             if not under_way:
                 break
             finished, _ = wait(under_way, LOOK, FIRST_COMPLETED)
             for future in finished:
                 start = under_way.pop(future)
                 part = parts[start]
-                part.flown.append(future.result())
+                part.flown.append(_flown(future))
                 count += len(part.flown[-1]["run"])
                 part.jobs_left -= 1
                 if part.jobs_left == 0:
@@ -185,10 +224,26 @@ def fly_campaign(
         for future, start in under_way.items():  # of an interrupted campaign
             future.cancel()
             if future.done() and not future.cancelled() and future.exception() is None:
-                parts[start].flown.append(future.result())
+                result = future.result()
+                if not isinstance(result, str):
+                    parts[start].flown.append(result)
         for start, part in parts.items():
             if part.flown:
                 write_part(part_file(kept, start), [*part.held, *part.flown], described)
+
+
+def _flown(job: Future[Columns | str]) -> Columns:
+    """Result of a job; CampaignError if it was refused, CampaignStopped if it was given up."""
+    try:
+        result = job.result()
+    except CancelledError as error:
+        raise CampaignStopped(
+            "the jobs were given up, as when a scheduler dies: "
+            "what was flown is kept, and the same command resumes"
+        ) from error
+    if isinstance(result, str):
+        raise CampaignError(result)
+    return result
 
 
 @dataclass
@@ -234,13 +289,17 @@ def open_campaign(folder: Path, level: float | None = None) -> Campaign:
     files = part_files(found[chosen[0]])
     if not files:
         raise CampaignError(f"{found[chosen[0]]} holds no runs of a campaign")
-    last, description = read_part(files[-1], ["run"])
+    last, described = read_part(files[-1], ["run"])
+    return _campaign_of(described, int(last["run"][-1]) + 1)
+
+
+def _campaign_of(described: dict[str, Any], runs: int) -> Campaign:
     return Campaign(
-        make_case(description["case"], description["parameters"]),
-        description["level"],
-        int(last["run"][-1]) + 1,
-        description["seed"],
-        description["random_starts"],
+        make_case(described["case"], described["parameters"]),
+        described["level"],
+        runs,
+        described["seed"],
+        described["random_starts"],
     )
 
 

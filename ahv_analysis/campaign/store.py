@@ -8,7 +8,9 @@ part, whatever the size of the whole. Together the files are one table, sorted b
 
 import json
 import os
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,13 @@ import pyarrow.parquet as pq
 
 from ahv_analysis.bag.record import Array
 from ahv_analysis.errors import CampaignError
+from ahv_analysis.flight.outcome import Cause
+from ahv_plant.dispersion import Dispersion
+from ahv_plant.model.constants import DEGREES
 
 PART_RUNS = 2048  # of a file: some seconds of work and half a megabyte
 DESCRIBED = {"source", "case", "level", "seed", "random_starts", "parameters"}
+CHECKSUM = b"ahv_checksum"
 Columns = dict[str, Array]
 
 
@@ -44,18 +50,79 @@ def part_files(runs: Path) -> list[Path]:
     return sorted(runs.glob("part-*.parquet"))
 
 
+# Least and largest that a column may hold; a vehicle that failed at once keeps what it began with.
+PLAUSIBLE = {
+    **{name: (0.05, 5.0) for name in Dispersion._fields},  # [-]
+    "initial_u": (0.0, 8100.0),  # [m/s]
+    **{f"initial_{rate}": (-1.7, 1.7) for rate in "PQR"},  # [rad/s]
+    "initial_h": (-500.0, 48500.0),  # [m]
+    "cause": (min(Cause), max(Cause)),
+    "time_s": (0.0, 3600.0),
+    "max_abs_alpha_deg": (0.0, 180.0),
+    "alpha_margin_deg": (-175.0, 5.0),
+    "max_abs_beta_deg": (0.0, 90.0),
+    "max_abs_rate_dps": (0.0, inf),
+    "max_abs_phi_deg": (0.0, inf),
+    "min_surface_deg": (-40.0 - 1e-9, 9.0 * DEGREES),
+    "max_surface_deg": (-9.0 * DEGREES, 30.0 + 1e-9),
+    "min_throttle": (0.1, 9.0),
+    "max_throttle": (-9.0, 0.9),
+    "max_altitude_error_m": (0.0, 48500.0),
+    "max_observer_error_dps": (0.0, inf),
+    "final_altitude_m": (0.0, 48500.0),
+    "final_speed_mps": (-inf, inf),
+    "trim_exists": (False, True),
+    "trim_alpha_deg": (-90.0, 90.0),  # where one exists
+}
+
+
 def read_part(path: Path, names: Sequence[str] | None = None) -> tuple[Columns, dict[str, Any]]:
-    """Columns of a part, all or those of `names`, and the description of its campaign."""
+    """Columns of a part, all or those of `names`, and the description of its campaign.
+
+    All of the file is looked at, whatever is asked for, so that no damage goes unnoticed.
+    """
     try:
-        table = pq.read_table(path, columns=None if names is None else list(names))
-        description = json.loads(table.schema.metadata[b"ahv"])
-        columns = {name: table[name].to_numpy() for name in names or table.column_names}
-        if "run" not in columns or not set(description) >= DESCRIBED:
-            raise ValueError("it lacks the runs or the description")
+        table = pq.read_table(path, page_checksum_verification=True)
+        text = table.schema.metadata[b"ahv"]
+        description = json.loads(text)
+        columns = {name: table[name].to_numpy() for name in table.column_names}
+        if not set(description) >= DESCRIBED:
+            raise ValueError("it lacks the description")
+        checksum = table.schema.metadata.get(CHECKSUM)
+        if checksum not in (None, _checksum(text, columns["run"])):  # None: of an older campaign
+            raise ValueError("its description or its number of runs has changed")
+        check_columns(columns, int(path.stem.removeprefix("part-")))
     except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
-        raise CampaignError(f"{path} is not the file of a campaign: {reason}") from error
-    return columns, description
+        raise CampaignError(
+            f"{path} is not the file of a campaign, or is damaged ({reason}): "
+            "delete it and run again, and its runs are flown anew"
+        ) from error
+    return {name: columns[name] for name in names or columns}, description
+
+
+def _checksum(text: bytes, runs: Array) -> bytes:
+    """Checksum of what stands outside the pages of a file, which have their own."""
+    return str(zlib.crc32(text + runs.tobytes())).encode()
+
+
+def check_columns(columns: Columns, first: int) -> None:
+    """Raise ValueError where the columns of the part from run `first` on are not plausible."""
+    if columns.keys() != {"run", *PLAUSIBLE}:
+        raise ValueError(f"its columns are {', '.join(columns)}")
+    runs = columns["run"]
+    if np.any(np.diff(runs) <= 0) or not (first <= runs[0] and runs[-1] < first + PART_RUNS):
+        raise ValueError(f"its runs are not of {first} to {first + PART_RUNS - 1}")
+    for name, (least, largest) in PLAUSIBLE.items():
+        values = columns[name]
+        inside = (values >= least) & (values <= largest)
+        if name == "trim_alpha_deg":
+            inside |= ~columns["trim_exists"]
+        if not np.all(inside):
+            wrong = np.flatnonzero(~inside)[0]
+            raise ValueError(
+                f"{name} of run {runs[wrong]} is {values[wrong]}, and not {least:g} to {largest:g}"
+            )
 
 
 def read_parts(
@@ -67,11 +134,22 @@ def read_parts(
     """
     for path in part_files(runs):
         columns, found = read_part(path, names)
-        if described is not None and found != json.loads(json.dumps(described)):
+        differing = "" if described is None else differences(found, described)
+        if differing:
             raise CampaignError(
-                f"{runs} holds another campaign, or one of other code: choose another --out"
+                f"{runs} holds another campaign, or one of other code ({differing}): "
+                "choose another --out"
             )
         yield columns
+
+
+def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
+    """What two descriptions do not have in common, in words; empty if nothing."""
+    return ", ".join(
+        name if isinstance(value, Mapping) else f"{name} {there.get(name)} there and {value} here"
+        for name, value in here.items()
+        if there.get(name) != value
+    )
 
 
 def write_part(path: Path, parts: Sequence[Columns], described: Mapping[str, Any]) -> None:
@@ -80,5 +158,8 @@ def write_part(path: Path, parts: Sequence[Columns], described: Mapping[str, Any
     _, order = np.unique(joined["run"], return_index=True)
     table = pa.table({name: column[order] for name, column in joined.items()})
     draft = path.with_name(f".{path.name}.{os.getpid()}")  # no reader sees a name with a dot
-    pq.write_table(table.replace_schema_metadata({"ahv": json.dumps(described)}), draft)
+    text = json.dumps(described).encode()
+    checksum = _checksum(text, table["run"].to_numpy())
+    table = table.replace_schema_metadata({b"ahv": text, CHECKSUM: checksum})
+    pq.write_table(table, draft, write_page_checksum=True)
     draft.replace(path)

@@ -19,7 +19,7 @@ from ahv_analysis.command.figures import figures
 from ahv_analysis.command.fly import CaseCommand, fly
 from ahv_analysis.command.replay import replay
 from ahv_analysis.command.trim import trim
-from ahv_analysis.errors import BagError, CampaignError, GraphError
+from ahv_analysis.errors import BagError, CampaignError, CampaignStopped, GraphError
 from ahv_analysis.report.report import report
 from ahv_msgs_py.parameters import ParameterError
 
@@ -77,7 +77,7 @@ def errors_in_a_sentence(as_json: bool) -> Iterator[None]:
             _give_up_output()
             raise typer.Exit(UNREAD) from None
         _refuse(str(error), as_json, 2)
-    except GraphError as error:
+    except (GraphError, CampaignStopped) as error:
         _refuse(str(error), as_json, 1)
 
 

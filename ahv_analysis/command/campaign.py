@@ -2,7 +2,9 @@
 """The commands of campaigns: `ahv monte-carlo`, its `rerun`, and `ahv table`."""
 
 import json
+import logging
 import os
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -48,6 +50,7 @@ def executor_of(workers: int, dask: str | None) -> Iterator[Executor]:
         from distributed import Client
     except ModuleNotFoundError as error:
         raise UsageError("--dask needs the extra ahv[dask]") from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what fails is said here
     try:
         client = Client(dask, timeout="10s")
     except (OSError, ValueError) as error:
@@ -161,8 +164,7 @@ def rerun(
     """
     import numpy as np
 
-    from ahv_analysis.campaign.batch import fly_alone
-    from ahv_analysis.campaign.campaign import find_run, flight_columns, open_campaign
+    from ahv_analysis.campaign.campaign import find_run, fly_again, open_campaign
     from ahv_analysis.flight.library import fly_library
     from ahv_analysis.flight.outcome import Cause
 
@@ -171,19 +173,17 @@ def rerun(
     if row is None:
         raise UsageError(f"run {run} is not in {folder}, whose last run is {campaign.runs - 1}")
     case = campaign.case_of(run)
-    outcome = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
-    alone = flight_columns(
-        np.array([run]),
-        np.array([case.plant.truth.dispersion]),
-        np.array([case.plant.initial]),
-        np.array([outcome]),
-    )
-    differing = [name for name in alone if alone[name][0] != row[name]]
+    alone = {name: column[0] for name, column in fly_again(campaign, run).items()}
+    differing = [
+        name
+        for name, value in alone.items()
+        if not np.array_equal(value, row[name], equal_nan=name == "trim_alpha_deg")
+    ]
     result = {
         "run": run,
-        "cause": Cause(int(outcome.cause)).name.lower(),
-        "time_s": float(alone["time_s"][0]),
-        "max_abs_alpha_deg": float(alone["max_abs_alpha_deg"][0]),
+        "cause": Cause(alone["cause"]).name.lower(),
+        "time_s": float(alone["time_s"]),
+        "max_abs_alpha_deg": float(alone["max_abs_alpha_deg"]),
         "same_bits": not differing,
         "differing": differing,
     }
@@ -204,6 +204,12 @@ def rerun(
         print_json(result)
     else:
         show_table(f"run {run} again", [(name, str(value)) for name, value in result.items()])
+    if differing:
+        print(
+            f"ahv: run {run} differs from the campaign's in {', '.join(differing)}",
+            file=sys.stderr,
+        )
+        raise typer.Exit(1)
 
 
 def table(

@@ -9,8 +9,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import yaml
-
 from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
 from ahv_control.parameters import (
@@ -22,6 +20,7 @@ from ahv_control.parameters import (
 )
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES, case_nodes, controllers
+from ahv_msgs_py.parameter_file import read_parameter_file
 from ahv_msgs_py.parameters import SHARED, ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
@@ -126,23 +125,15 @@ def make_case(
 
 def _read(path: Path) -> dict[str, dict[str, object]]:
     """Parameters per node as the file gives them, those of `/**` given to all that know them."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise ParameterError(f"{path.name}: not a readable YAML file: {reason}") from error
-    sections: dict[str, dict[str, object]] = {}
+    sections = read_parameter_file(path)
     valid = [EVERY_NODE] + [f"{NAMESPACE}/{node}" for node in case_nodes()]
-    if not isinstance(content, dict):
+    if not sections:
         raise ParameterError(f"{path.name}: must have sections {', '.join(valid)}")
-    for section, body in content.items():
+    for section in sections:
         if section not in valid:
             raise ParameterError(
                 f"{path.name}: there is no node {section!r}; valid are {', '.join(valid)}"
             )
-        if not isinstance(body, dict) or not isinstance(body.get("ros__parameters"), dict):
-            raise ParameterError(f"{path.name}: {section} must hold a section ros__parameters")
-        sections[section] = _flat(body["ros__parameters"])
     shared = sections.get(EVERY_NODE, {})
     for name in shared:
         if name not in SHARED:
@@ -161,14 +152,3 @@ def _read(path: Path) -> dict[str, dict[str, object]]:
         for node in case_nodes()
         for known in [{parameter.name for parameter in NODES[node].parameters}]
     }
-
-
-def _flat(tree: dict[str, object], prefix: str = "") -> dict[str, object]:
-    """Nested sections as dotted names, as ROS has them."""
-    flat: dict[str, object] = {}
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = value
-    return flat

@@ -11,7 +11,7 @@ from ahv_analysis.flight.closed_loop import Loop
 from ahv_control.disturbance_learner import LearnerState
 from ahv_plant.model.constants import UNSTART_ALPHA
 from ahv_plant.model.vectors import State
-from ahv_plant.numerics.elementary import atan_ratio
+from ahv_plant.numerics.elementary import atan2, atan_ratio
 from ahv_plant.numerics.elementwise import elementwise, select
 from ahv_plant.termination import termination
 
@@ -61,7 +61,7 @@ def observer_error(state: State, learner: LearnerState | None) -> float:
 def cause_now(state: State, status: int, geometric: bool) -> float:
     """Cause for which a flight fails at a state whose surfaces were found with `status`."""
     left = termination(state, geometric)
-    unstart = select(abs(atan_ratio(state.w, state.u)) > UNSTART_ALPHA, 4.0, 0.0)
+    unstart = select(abs(atan2(state.w, state.u)) > UNSTART_ALPHA, 4.0, 0.0)
     lost = select(status == 3, 3.0, unstart)
     outside = select(left == 2, 2.0, lost)
     return select(left == 1, 1.0, outside)
@@ -75,7 +75,7 @@ def next_outcome(outcome: Outcome, loop: Loop, altitude: float, geometric: bool)
     """
     state, answer = loop.state, loop.commands
     observed = observer_error(state, loop.memory)
-    alpha = abs(atan_ratio(state.w, state.u))
+    alpha = abs(atan2(state.w, state.u))
     v = abs(state.v)
     beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more
     flying = outcome.cause == 0.0

@@ -31,7 +31,7 @@ from ahv_plant.model.aerodynamic_fits import (
 from ahv_plant.model.atmosphere import atmosphere
 from ahv_plant.model.constants import DEGREES, MEAN_CHORD, WING_AREA, WING_SPAN
 from ahv_plant.model.vectors import State, Surfaces
-from ahv_plant.numerics.elementary import atan_ratio
+from ahv_plant.numerics.elementary import atan2, atan_ratio
 from ahv_plant.numerics.elementwise import elementwise
 
 MACH_MINIMUM = 4.0  # [-] the fits hold above
@@ -80,7 +80,7 @@ def air_data(state: State, geometric: bool) -> AirData:
     speed = sqrt(state.u * state.u + state.v * state.v + state.w * state.w)
     return AirData(
         speed,
-        atan_ratio(state.w, state.u),
+        atan2(state.w, state.u),
         atan_ratio(state.v, in_plane),  # = asin(v / V_t)
         speed / air.sound_speed,
         0.5 * air.density * speed * speed,

@@ -16,6 +16,8 @@ HALF_PI_1 = 1.5707963267341256  # [rad]
 HALF_PI_2 = 6.077100506303966e-11  # [rad]
 HALF_PI_3 = 2.0222662487959506e-21  # [rad]
 HALF_PI = 1.5707963267948966  # [rad]
+PI = 3.141592653589793  # [rad]
+PI_REST = 1.2246467991473532e-16  # [rad] what PI lacks
 QUARTER_PI = 0.7853981633974483  # [rad]
 TAN_EIGHTH_PI = 0.41421356237309503  # [-]
 # Adding and taking away 1.5 * 2**52 rounds a double of moderate size to the nearest integer.
@@ -64,6 +66,15 @@ def atan_ratio(y: float, x: float) -> float:
     p = t + t * z * (-0.3333333333333333 + z * (0.1999999999999552 + z * p))
     p = select(upper, QUARTER_PI + p, p)
     p = select(steep, HALF_PI - p, p)
+    return select(y < 0.0, -p, p)
+
+
+@elementwise
+def atan2(y: float, x: float) -> float:
+    """Arctangent [rad] of y / x in the quadrant of x and y, from -pi to pi; not both are zero."""
+    size = select(y < 0.0, -y, y)
+    ahead = atan_ratio(size, abs(x))
+    p = select(x < 0.0, PI - (ahead - PI_REST), ahead)
     return select(y < 0.0, -p, p)
 
 

@@ -8,10 +8,7 @@ Fastmath is off, so no operation is contracted or reordered, and all three ways 
 NUMBA_DISABLE_JIT=1 runs the very same source as plain Python, `ahv_plant.numerics.simd` in lanes.
 """
 
-import hashlib
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -20,40 +17,13 @@ from numba import types
 from numba.core import config
 from numba.extending import overload
 
+from ahv_plant.numerics.cache import keep_machine_code
+from ahv_plant.numerics.identity import Definition, identity
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 Value = TypeVar("Value")
-
-
-def source_hash() -> str:
-    """Hash the sources of all compiled code.
-
-    Numba looks only at the file of the function that it caches; a callee changed in another file
-    would go on with its old machine code.
-    """
-    house = Path(__file__).resolve().parents[2]
-    digest = hashlib.sha256(numba.__version__.encode())
-    for room in ("ahv_plant", "ahv_control", "ahv_analysis"):
-        for source in sorted((house / room).rglob("*.py")):
-            digest.update(str(source.relative_to(house)).encode() + source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _cache_directory() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "ahv" / source_hash()
-
-
-_CACHE = _cache_directory()
-
-
-@contextmanager
-def _numba_cache_in(directory: Path) -> Iterator[None]:
-    """Point numba at `directory` while one function sets up its cache, and nobody else's."""
-    before, config.CACHE_DIR = config.CACHE_DIR, str(directory)
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before
+# any elementwise function may be called with lanes, whether its source speaks of them or not
+LANES = Definition(Path(__file__).resolve().with_name("simd.py"))
 
 
 def elementwise(function: Function) -> Function:
@@ -68,9 +38,12 @@ def kernel(function: Function) -> Function:
 
 def _compile(function: Function, **options: bool) -> Function:
     dispatcher = numba.njit(function, error_model="numpy", **options)
-    if not config.DISABLE_JIT:
-        with _numba_cache_in(_CACHE):
-            dispatcher.enable_caching()
+    code, source = function.__code__, Path(function.__code__.co_filename).resolve()
+    # what a closure holds, or what was typed in, stands in no source
+    if not config.DISABLE_JIT and not code.co_freevars and source.is_file():
+        root = Definition(source, function.__qualname__.partition(".")[0])
+        name = f"{source.stem}.{function.__qualname__}"
+        keep_machine_code(dispatcher, name, identity(root, LANES))
     return cast(Function, dispatcher)  # calls like the function, so type checkers see that
 
 

@@ -6,18 +6,20 @@ and then advance all runs at once: one vector instruction of the processor for e
 Every lane gets the bits of the scalar function. Comparisons give lanes of booleans, which
 `select`, `&` and `|` understand; conditional expressions, `and` and `or` do not.
 
-Lanes exist in compiled code only; `load` and `store` move them from and to arrays with one row
-for each number and one column for each run.
+`load` and `store` move them from and to arrays with one row for each number and one column for
+each run. Lanes exist in compiled code only; in plain Python there is one run at a time, whose
+numbers are floats.
 """
 
 import math
 import operator
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, cast
 
+import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, config
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.cpython.builtins import do_minmax
@@ -29,13 +31,16 @@ from numba.extending import (
     overload,
     register_model,
 )
+from numpy.typing import NDArray
 
-from ahv_plant.numerics.elementwise import select
+from ahv_plant.numerics.elementwise import Value, select
 
+Array = NDArray[np.float64]
 Emit = Callable[..., ir.Value]  # of numba's context, the builder, the signature and the arguments
 Typed = tuple[types.Type, Emit] | None  # what an intrinsic returns: its signature and its code
 
-LANES = 16  # two vector registers of 8 doubles, to hide latencies
+# two vector registers of 8 doubles, to hide latencies
+LANES = 1 if config.DISABLE_JIT else 16
 
 
 class Lanes(types.Type):
@@ -189,12 +194,17 @@ def _filled(
     return context.make_tuple(builder, kind, parts)
 
 
-@intrinsic
-def widen(typingctx: Any, value: types.Type, sample: types.Type) -> Typed:
+def widen(value: Value, sample: object) -> Value:
     """Put every number of a nested tuple into all lanes if `sample` is lanes, so that types agree.
 
     Beside a plain `sample`, and for lanes, booleans and None, nothing changes.
     """
+    return value
+
+
+@intrinsic
+def lanes_widen(typingctx: Any, value: types.Type, sample: types.Type) -> Typed:
+    """`widen` in compiled code."""
     kind = _widened(value) if isinstance(sample, Lanes) else value
 
     def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
@@ -224,9 +234,22 @@ def _row(
     return builder.bitcast(place, vector.as_pointer())
 
 
-@intrinsic
-def load(typingctx: Any, like: types.Type, array: types.Array) -> Typed:
+def load(like: Value, array: Array) -> Value:
     """Fill a nested tuple `like` this with lanes from successive rows of `array`."""
+    numbers = iter(array[:, 0].tolist())
+
+    def filled(part: Any) -> Any:
+        if not isinstance(part, tuple):
+            return None if part is None else next(numbers)
+        parts = [filled(inner) for inner in part]
+        return type(part)(*parts) if hasattr(part, "_fields") else tuple(parts)
+
+    return cast(Value, filled(like))
+
+
+@intrinsic
+def lanes_load(typingctx: Any, like: types.Type, array: types.Array) -> Typed:
+    """`load` in compiled code."""
     kind = _widened(like)
 
     def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
@@ -242,9 +265,22 @@ def load(typingctx: Any, like: types.Type, array: types.Array) -> Typed:
     return kind(like, array), emit
 
 
-@intrinsic
-def store(typingctx: Any, array: types.Array, value: types.Type) -> Typed:
+def store(array: Array, value: object) -> None:
     """Write the lanes of a nested tuple, all numbers, to successive rows of a float `array`."""
+
+    def leaves(part: object) -> Iterator[Any]:
+        if not isinstance(part, tuple):
+            yield part
+            return
+        for inner in part:
+            yield from leaves(inner)
+
+    array[:, 0] = list(leaves(value))
+
+
+@intrinsic
+def lanes_store(typingctx: Any, array: types.Array, value: types.Type) -> Typed:
+    """`store` in compiled code."""
 
     def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
         vector = context.get_value_type(FLOATS)
@@ -260,6 +296,22 @@ def store(typingctx: Any, array: types.Array, value: types.Type) -> Typed:
         return context.get_dummy_value()
 
     return types.none(array, value), emit
+
+
+# without forceinline the vectors would go through memory at every call
+@overload(widen, jit_options={"forceinline": True})
+def _widen(value, sample):  # type: ignore[no-untyped-def]  # as in elementwise.py
+    return lambda value, sample: lanes_widen(value, sample)
+
+
+@overload(load, jit_options={"forceinline": True})
+def _load(like, array):  # type: ignore[no-untyped-def]
+    return lambda like, array: lanes_load(like, array)
+
+
+@overload(store, jit_options={"forceinline": True})
+def _store(array, value):  # type: ignore[no-untyped-def]
+    return lambda array, value: lanes_store(array, value)
 
 
 @overload(select)
