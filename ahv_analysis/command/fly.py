@@ -114,6 +114,10 @@ def fly(
             check_domain()
             if network:
                 os.environ.setdefault(DISCOVERY_RANGE, "SUBNET")
+            if processes and os.environ.get(DISCOVERY_RANGE) == "OFF":
+                raise UsageError(
+                    f"{DISCOVERY_RANGE} is OFF, so that processes do not hear each other: unset it"
+                )
             fly_ros = _engine(processes)
             ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
         else:
