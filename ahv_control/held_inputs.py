@@ -8,7 +8,7 @@ from ahv_control.flight_control import NEUTRAL
 from ahv_msgs_py.node.faults import HOLD, PERIOD
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_plant.model.vectors import Surfaces
-from ahv_plant.safe_command import safe_surfaces
+from ahv_plant.safe_command import level_surfaces
 
 
 def held_rates(last: Values | None, age: int) -> Values:
@@ -22,7 +22,7 @@ def held_surfaces(last: Values | None, age: int) -> Values:
     """Surfaces [rad]: those that the plant holds, and then its safe command."""
     if last is None:
         return NEUTRAL
-    return last if age * PERIOD <= HOLD else safe_surfaces(Surfaces(*last))
+    return last if age * PERIOD <= HOLD else level_surfaces(Surfaces(*last))
 
 
 def held_estimate(last: Values | None, age: int) -> Values:

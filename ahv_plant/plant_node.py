@@ -100,6 +100,7 @@ class PlantNode(BaseNode):
         self._listeners: dict[bytes, str] = {}  # nodes that hear the state, by their GID
         self._surfaces = Held(SURFACE_COMMAND, (0.0, 0.0, 0.0))
         self._throttle = Held(THROTTLE_COMMAND, (SAFE_THROTTLE,))
+        self._answered_state = self.state  # in real time, the last one
         self._latencies = array("q")  # [ns] from a state to both its commands
         self._published = 0  # [ns] when the newest state was
         if self.realtime:
@@ -221,7 +222,10 @@ class PlantNode(BaseNode):
         self._ticked = now
         surfaces = self._command(self._surfaces)
         if surfaces is None:
-            surfaces = safe_surfaces(Surfaces(*self._surfaces.values))
+            held = Surfaces(*self._surfaces.values)
+            surfaces = safe_surfaces(held, self._answered_state, self.state)
+        elif self._surfaces.stamp == self.now:
+            self._answered_state = self.state
         throttle = self._command(self._throttle) or self._throttle.values
         self._advance(surfaces, throttle)
 

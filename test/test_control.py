@@ -27,8 +27,8 @@ from ahv_plant.model.constants import (
     THROTTLE_MAXIMUM,
     THROTTLE_MINIMUM,
 )
-from ahv_plant.model.vectors import Attitude, Rates, Surfaces
-from ahv_plant.safe_command import safe_surfaces
+from ahv_plant.model.vectors import Attitude, Rates, Surfaces, limit_surfaces
+from ahv_plant.safe_command import level_surfaces, safe_surfaces
 from ahv_plant.vehicle import state_rate
 from test.flights import CRUISE, STATES, SURFACES, between, degrees
 
@@ -174,8 +174,13 @@ def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous)
 
 
 @given(SURFACES)
-def test_the_safe_command_keeps_the_pitching_elevons_and_turns_nothing(held):
-    safe = safe_surfaces(held)
-    assert safe.right_elevon == safe.left_elevon
-    assert safe.right_elevon + safe.left_elevon == pytest.approx(sum(held[:2]), abs=1e-15)
-    assert safe.rudder == 0.0
+def test_level_surfaces_keep_the_pitching_elevons_and_turn_nothing(held):
+    level = level_surfaces(held)
+    assert level.right_elevon == level.left_elevon
+    assert level.right_elevon + level.left_elevon == pytest.approx(sum(held[:2]), abs=1e-15)
+    assert level.rudder == 0.0
+
+
+@given(SURFACES)
+def test_the_safe_command_is_level_where_nothing_moved(held):
+    assert safe_surfaces(held, CRUISE, CRUISE) == limit_surfaces(level_surfaces(held))

@@ -86,7 +86,8 @@ class Fault(Enum):
     COMMAND_LOST = Response(
         "plant, in real time",
         "no valid surface or throttle command for 200 ms",
-        "safe command: both elevons at the mean of the two held, rudder neutral; throttle held; "
+        "safe command: both elevons from the mean of the two held to keep the angle of attack, "
+        "by what is measured of it and of the pitch rate; rudder neutral; throttle held; "
         "obeyed again from the first valid command on",
         "200 ms",
         error=True,
