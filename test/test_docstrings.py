@@ -22,7 +22,8 @@ SOURCES = {
     if not path.name.endswith(("_node.py", "__init__.py"))
 }
 # Tools, and what crosses a topic: no equation of the report stands behind them.
-OWN = {f"ahv_plant.numerics.{name}" for name in ("elementwise", "simd", "elementary", "optional")}
+_NUMERICS = ("elementwise", "simd", "elementary", "optional", "identity", "cache")
+OWN = {f"ahv_plant.numerics.{name}" for name in _NUMERICS}
 OWN |= {
     "ahv_plant.model.vectors",
     "ahv_plant.termination",
