@@ -37,6 +37,11 @@ def what_computes(*roots: Definition) -> dict[str, str]:
     }
 
 
+def source_hash() -> str:
+    """Hash of what flies: the code that this process runs, for sources are read once."""
+    return identity(*FLIES)
+
+
 def versions() -> dict[str, str]:
     """Versions of Python and of packages that a flight depends on; a hash of what computes it.
 
@@ -50,4 +55,4 @@ def versions() -> dict[str, str]:
             except PackageNotFoundError:
                 continue
             break
-    return found | {"python": platform.python_version(), "source": identity(*FLIES)}
+    return found | {"python": platform.python_version(), "source": source_hash()}

@@ -4,6 +4,7 @@
 import os
 
 from ahv_analysis.flight.case import load_case
+from ahv_analysis.versions import source_hash
 from ahv_control.disturbance_learner import disturbance_estimate
 from ahv_control.flight_control import NEUTRAL, first_learner, next_learner
 from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
@@ -11,7 +12,6 @@ from ahv_control.intermediate_loop import rate_command
 from ahv_control.outer_loop import attitude_command
 from ahv_control.velocity_loop import throttle_command
 from ahv_plant.model.vectors import Rates
-from ahv_plant.numerics.elementwise import source_hash
 from ahv_plant.parameters import DEFAULT_START
 from ahv_plant.termination import termination_reason
 from ahv_plant.vehicle import vehicle_step

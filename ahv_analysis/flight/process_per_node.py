@@ -21,6 +21,7 @@ from ahv_analysis.faults.faulty_node import faulty
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.library import INTERRUPTED
 from ahv_analysis.interrupt import SIGNALS, signals_wait
+from ahv_analysis.versions import source_hash
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.log_folder import log_where_it_can
@@ -29,7 +30,6 @@ from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import Value
-from ahv_plant.numerics.elementwise import source_hash
 from ahv_plant.plant_node import PlantNode
 
 SAFE_PATH = "PYTHONSAFEPATH"
