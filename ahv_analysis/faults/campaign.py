@@ -11,19 +11,28 @@ from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from std_msgs.msg import String
 
+from ahv_analysis.bag.info import bag_info
 from ahv_analysis.bag.reader import load_bag
 from ahv_analysis.bag.recovery import recover
-from ahv_analysis.errors import GraphError
+from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.faults.faulty_node import INJECT
+from ahv_analysis.faults.whole_flights import fly_with, whole_flight_faults
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.process_per_node import (
     LONGEST_START,
     ProcessGraph,
 )
+from ahv_analysis.flight.summary import summarize
 from ahv_analysis.flight.watcher import Watcher
 from ahv_analysis.interrupt import signals_wait
+from ahv_analysis.report.page import render
+from ahv_analysis.report.page_flight import read_flights
 from ahv_msgs_py.graph import controllers, listeners
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.log_folder import log_where_it_can
@@ -32,7 +41,11 @@ from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.topics import (
     BY_NAME,
+    DIAGNOSTICS,
+    FLIGHT,
+    FLOWN,
     LOOP_TOPICS,
+    NAMESPACE,
     RATE_COMMAND,
     STATE,
     SURFACE_COMMAND,
@@ -70,6 +83,9 @@ EXPECTED = {
     "wild": {Fault.SURFACES_SATURATED, Fault.NEWTON_LIMIT, Fault.NEWTON_SINGULAR},
     "second publisher": {Fault.SECOND_PUBLISHER},
 }
+# Nobody has to report these: they are refused, or nothing comes of them.
+REFUSED = ("use_sim_time", "foreign diagnostic")
+FOREIGN = ("/factory/plant", f"{NAMESPACE}/plant")  # whose diagnostics say that all is over
 
 
 class Injection(NamedTuple):
@@ -97,6 +113,10 @@ def draw_injections(random: Random, count: int) -> Iterator[tuple[str, str, floa
             plans.append((kind, COMMANDS))
         elif kind not in ("killed", "stopped"):
             plans.append((kind, RECEIVED))
+    plans += [
+        ("use_sim_time", (*CONTROLLERS, "plant", "recorder")),
+        ("foreign diagnostic", FOREIGN),
+    ]
     queue: list[tuple[str, tuple[str, ...]]] = []
     for _ in range(count):
         if not queue:
@@ -106,7 +126,29 @@ def draw_injections(random: Random, count: int) -> Iterator[tuple[str, str, floa
         yield kind, random.choice(targets), random.uniform(0.01, longest.get(kind, 0.3))
 
 
-class Spectator(Watcher):
+class Liar(Watcher):
+    """Says what is not so, and is nobody to say it."""
+
+    def __init__(self, interrupted: Callable[[], bool] = lambda: False):
+        """Be ready to speak."""
+        super().__init__(interrupted)
+        durable = quality(durable=True, depth=10)
+        self._slander = self._node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, durable)
+        self._end = self._node.create_publisher(
+            message_class(FLIGHT.layout.type_name), FLIGHT.name, durable
+        )
+
+    def slander(self, name: str) -> None:
+        """Publish diagnostics of a name that is not one's own: it is over, for no known reason."""
+        over = DiagnosticStatus(name=name, values=[KeyValue(key="over", value="True")])
+        self._slander.publish(DiagnosticArray(status=[over]))
+
+    def end(self) -> None:
+        """Say falsely that the flight has ended."""
+        self._end.publish(FLIGHT.layout.encode(max(1, self.step) * STEP_NS, (1.0, 1.0, FLOWN)))
+
+
+class Spectator(Liar):
     """Sees the states, and can speak where it should not."""
 
     def __init__(self, interrupted: Callable[[], bool] = lambda: False):
@@ -140,6 +182,19 @@ class Spectator(Watcher):
         text = json.dumps({"topic": topic, "kind": kind, "count": count})
         self._orders.publish(String(data=text))
 
+    def use_sim_time(self, node: str) -> bool:
+        """Ask a node to go by simulated time; whether it does."""
+        client = self._node.create_client(SetParameters, f"{NAMESPACE}/{node}/set_parameters")
+        value = ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=True)
+        request = SetParameters.Request(
+            parameters=[ParameterMessage(name="use_sim_time", value=value)]
+        )
+        client.wait_for_service(SETTLE)
+        answer = client.call_async(request)
+        self._executor.spin_until_future_complete(answer, SETTLE)
+        self._node.destroy_client(client)
+        return answer.done() and answer.result().results[0].successful
+
     def speak(self, topic: LoopTopic, seconds: float) -> None:
         """Publish commands of one's own on a topic that has its publisher."""
         if topic.name not in self._voices:
@@ -172,6 +227,7 @@ def run_campaign(
         )
         flights.append(flight | _judge_bag(bag, done[before:]))
     flights.append(_bereaved_flight(out / "bag-of-a-killed-recorder", done))
+    done += _whole_flights(out)
     report = _report(done, flights, seed)
     (out / "faults.json").write_text(json.dumps(report, indent=1, allow_nan=False) + "\n")
     return report
@@ -249,8 +305,23 @@ def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
         "unexpected_ends": [],
         "not_finite": {},
         "states_missing_in_bag": 0,
+        "unreadable": _unreadable(recovered),
         "lost_with_the_recorder_s": max(0.0, (killed - max(stamps)) * 1e-9),
     }
+
+
+def _whole_flights(out: Path) -> Iterator[Injection]:
+    """Flights by the command, one for each fault that decides how a flight ends."""
+    keep_to_this_machine()
+    liar = Liar()
+    try:
+        for fault in whole_flight_faults(liar.end):
+            liar.step = -1
+            end = fly_with(fault, out / fault.kind.replace(" ", "-"), liar)
+            time = max(0, liar.step) * STEP_NS * 1e-9
+            yield Injection(fault.kind, fault.target, time, 0.0, end.words, 0.0, end.max_abs_alpha)
+    finally:
+        liar.close()
 
 
 def _wait_for_flight(spectator: Spectator) -> None:
@@ -268,6 +339,7 @@ def _inject(
     spectator.max_abs_alpha = 0.0
     seen = len(spectator.statuses)
     start = spectator.stamp
+    noticed, latency = "", None
     if kind == "killed":
         graph.kill(target)
         spectator.look(length)
@@ -278,15 +350,23 @@ def _inject(
         graph.signal(target, signal.SIGSTOP)
         spectator.look(length)
         graph.signal(target, signal.SIGCONT)
+    elif kind == "use_sim_time":
+        noticed = "" if spectator.use_sim_time(target) else f"{target}: refused"
+    elif kind == "foreign diagnostic":
+        spectator.slander(target)
     elif kind == "second publisher":
         topic = next(topic for topic in LOOP_TOPICS if topic.name == target)
         spectator.speak(topic, length)
     else:
         spectator.order(target, kind, max(1, round(length * 1e9 / STEP_NS)))
         spectator.look(length)
+    settled = spectator.stamp
     spectator.look(SETTLE)
-    noticed, latency = "", None
-    names = {fault.name.lower().replace("_", " ") for fault in EXPECTED[kind]}
+    if kind == "foreign diagnostic" and spectator.stamp - settled > 0.5 * SETTLE * 1e9:
+        noticed = "the flight goes on"
+    if noticed:
+        latency = (settled - start) * 1e-9
+    names = {fault.name.lower().replace("_", " ") for fault in EXPECTED.get(kind, ())}
     for stamp, node, _, text, _ in spectator.statuses[seen:]:
         if any(text.startswith(f"{name}:") for name in names):
             noticed, latency = f"{node}: {text.partition(':')[0]}", (stamp - start) * 1e-9
@@ -323,7 +403,21 @@ def _judge_bag(bag: Path, injected: list[Injection]) -> dict[str, Any]:
     return {
         "not_finite": dict(not_finite),
         "states_missing_in_bag": max(0, len(set(range(last + 1)) - stamps) - spoilt),
+        "unreadable": _unreadable(bag),
     }
+
+
+def _unreadable(bag: Path) -> str:
+    """Why what a user does with a bag cannot be done with this one; empty if it can."""
+    try:
+        facts = bag_info(bag)
+        flight = read_flights([bag])[0]
+        assert flight.case is not None
+        summarize(flight.record, flight.ended_early, flight.case.control)
+        page = render([flight])
+    except (BagError, AssertionError) as error:
+        return str(error) or "it has no notes"
+    return "" if facts["steps"] and page else "it is empty"
 
 
 def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> dict[str, Any]:
@@ -336,7 +430,7 @@ def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> 
             latencies = [entry.latency for entry in of_kind if entry.latency is not None]
             kinds[kind] = {
                 "injected": len(of_kind),
-                "noticed": len(latencies),
+                "noticed": sum(bool(entry.noticed) for entry in of_kind),
                 "latency_s_max": max(latencies, default=None),
                 "max_abs_alpha_deg": max(entry.max_abs_alpha for entry in of_kind),
             }
@@ -346,7 +440,7 @@ def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> 
         and not unnoticed
         and all(flight.get("lost_with_the_recorder_s", 0.0) < LONGEST_LOSS for flight in flights)
         and all(
-            not (flight["unexpected_ends"] or flight["not_finite"])
+            not (flight["unexpected_ends"] or flight["not_finite"] or flight["unreadable"])
             and flight["states_missing_in_bag"] == 0
             for flight in flights
         )
