@@ -208,9 +208,16 @@ class Spectator(Liar):
 
 
 def run_campaign(
-    injections: int, seed: int, out: Path, progress: Callable[[int], None] = lambda done: None
+    injections: int,
+    seed: int,
+    out: Path,
+    progress: Callable[[int], None] = lambda done: None,
+    whole_flights: bool = True,
 ) -> dict[str, Any]:
-    """Fly and disturb until so many faults were injected; bags and `faults.json` go to `out`."""
+    """Fly and disturb until so many faults were injected; bags and `faults.json` go to `out`.
+
+    Then the faults that decide how a flight ends, with `whole_flights`: half a minute each.
+    """
     random = Random(seed)
     done: list[Injection] = []
     flights: list[dict[str, Any]] = []
@@ -227,7 +234,8 @@ def run_campaign(
         )
         flights.append(flight | _judge_bag(bag, done[before:]))
     flights.append(_bereaved_flight(out / "bag-of-a-killed-recorder", done))
-    done += _whole_flights(out)
+    if whole_flights:
+        done += _whole_flights(out)
     report = _report(done, flights, seed)
     (out / "faults.json").write_text(json.dumps(report, indent=1, allow_nan=False) + "\n")
     return report

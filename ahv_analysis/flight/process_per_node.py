@@ -55,7 +55,8 @@ class FlightReport:
         """In the plant's process: tell of the step now and then, and of the end."""
 
         def progress() -> None:
-            self._step.value = plant.step
+            if plant.now is not None:  # it flies, and does not wait for listeners any more
+                self._step.value = plant.step
 
         plant.create_timer(LOOK, progress)
         plant.finished.add_done_callback(lambda end: self._tell.send(end.result()))
