@@ -31,7 +31,7 @@ from ahv_analysis.flight.case import (
     notes,
 )
 from ahv_analysis.flight.library import fly as fly_steps
-from ahv_analysis.flight.summary import summarize
+from ahv_analysis.report.summary import summarize
 from ahv_plant.dispersion import draw_dispersion
 
 __all__ = ["Flight", "case_names", "fly", "fly_campaign", "read_bag"]

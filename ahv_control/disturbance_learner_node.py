@@ -22,7 +22,7 @@ from ahv_msgs_py.topics import (
 )
 from ahv_plant.model.constants import DEGREES, STEP_NS
 from ahv_plant.model.vectors import Rates, State, Surfaces
-from ahv_plant.parameters import DEFAULT_START
+from ahv_plant.start import DEFAULT_START
 
 
 class DisturbanceLearnerNode(BaseNode):

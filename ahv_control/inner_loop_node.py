@@ -21,7 +21,7 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
 )
 from ahv_plant.model.vectors import Rates, State
-from ahv_plant.parameters import DEFAULT_START
+from ahv_plant.start import DEFAULT_START
 
 FAULTS = {
     SolverStatus.SATURATED: Fault.SURFACES_SATURATED,

@@ -16,7 +16,7 @@ from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND
 from ahv_plant.model.vectors import State
-from ahv_plant.parameters import DEFAULT_START
+from ahv_plant.start import DEFAULT_START
 
 
 class OuterIntermediateNode(BaseNode):

@@ -12,7 +12,7 @@ from ahv_control.velocity_loop import VelocityLoop
 from ahv_msgs_py.parameters import Parameter, Value
 from ahv_plant.model.constants import RADIANS
 from ahv_plant.model.vectors import Rates
-from ahv_plant.parameters import GEOMETRIC_ALTITUDE
+from ahv_plant.start import GEOMETRIC_ALTITUDE
 
 FASTEST = 50.0  # [1/s] gains above half the control rate cannot be meant
 

@@ -15,7 +15,7 @@ from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import SURFACE_COMMAND, THROTTLE_COMMAND
 from ahv_plant.model.constants import THROTTLE_MAXIMUM, THROTTLE_MINIMUM
 from ahv_plant.model.vectors import State, Surfaces
-from ahv_plant.parameters import DEFAULT_START
+from ahv_plant.start import DEFAULT_START
 
 
 class VelocityNode(BaseNode):

@@ -3,6 +3,7 @@
 
 import ast
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -158,3 +159,42 @@ def test_laws_know_nothing_of_ros():
         if not str(path).endswith(("_node.py", *SHELLS))
     ]
     assert not imports(laws) & set(ROS)
+
+
+# What a room must not reach, not even by a detour: the truth, and the rooms that stand above it.
+OUT_OF_REACH = {
+    "ahv_control": ("ahv_plant.dispersion", "ahv_plant.vehicle", "ahv_plant.plant_node"),
+    "ahv_analysis.bag": ("ahv_analysis.flight", "ahv_plant.dispersion"),
+    "ahv_analysis.flight": ("ahv_analysis.campaign", "ahv_analysis.report", "ahv_analysis.faults"),
+    "ahv_analysis.campaign": ("ahv_analysis.report", "ahv_analysis.faults"),
+    "ahv_analysis.report": ("ahv_analysis.replay", "ahv_analysis.faults", "ahv_analysis.command"),
+    "ahv_analysis.replay": (
+        "ahv_analysis.campaign",
+        "ahv_analysis.faults",
+        "ahv_analysis.command",
+    ),
+    "ahv_analysis.faults": ("ahv_analysis.replay", "ahv_analysis.command"),
+}
+LOADED = """
+import sys
+from importlib import import_module
+
+for name in {names}:
+    import_module(name)
+print(*(name for name in sys.modules if name.startswith({out_of_reach})))
+"""
+
+
+@pytest.mark.parametrize("room", OUT_OF_REACH)
+def test_rooms_reach_one_way_not_even_by_a_detour(room):
+    """As a fresh interpreter has it in sys.modules when every module of the room is loaded."""
+    names = [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for path in sources(room.replace(".", "/"))
+        if path.stem not in ("node_server", "node_server_signals")  # of a process of their own
+    ]
+    program = LOADED.format(names=names, out_of_reach=OUT_OF_REACH[room])
+    loaded = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert loaded.stdout.split() == []

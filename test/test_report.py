@@ -19,7 +19,6 @@ from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.command.app import app
 from ahv_analysis.flight.case import Draw, load_case
 from ahv_analysis.flight.library import fly, fly_library, write_step
-from ahv_analysis.flight.summary import summarize
 from ahv_analysis.report.metrics import (
     held,
     margin,
@@ -34,6 +33,7 @@ from ahv_analysis.report.metrics import (
 )
 from ahv_analysis.report.page import number, render
 from ahv_analysis.report.page_flight import page_names, read_flights
+from ahv_analysis.report.summary import summarize
 from ahv_plant.model.constants import RADIANS
 
 TIME = np.arange(10001) * 0.01  # [s] to 100 s

@@ -8,8 +8,8 @@ from ahv_analysis.campaign.batch import fly_alone
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly, fly_library
 from ahv_analysis.flight.outcome import Cause
-from ahv_analysis.flight.summary import summarize
 from ahv_analysis.report.page_flight import read_flights
+from ahv_analysis.report.summary import summarize
 
 SHORT = {"duration": 2.0}
 

@@ -5,12 +5,13 @@ from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ahv_analysis.flight.library import Step
-from ahv_control.disturbance_learner import disturbance_estimate
+from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
+from ahv_control.law import Commands
 from ahv_control.learner_message import learner_values
 from ahv_control.newton_raphson import nominal_response
 from ahv_msgs_py.layout import NANOSECONDS
@@ -103,6 +104,16 @@ def _fill_air_data(states, geometric, rows):
         row, air = rows[step], air_data(state, geometric)
         row[0], row[1], row[2], row[3] = air.speed, air.alpha, air.beta, air.mach
         row[4], row[5], row[6] = air.dynamic_pressure, air.sin_alpha, air.cos_alpha
+
+
+class Step(NamedTuple):
+    """One step of a flight: the state and what the flight control answers."""
+
+    stamp: int  # [ns]
+    state: State
+    commands: Commands
+    learner: LearnerState | None
+    ended_early: str  # why this is the last step before its time; empty if it is not
 
 
 def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:

@@ -18,9 +18,9 @@ from ahv_analysis.command.faults import faults
 from ahv_analysis.command.figures import figures
 from ahv_analysis.command.fly import CaseCommand, fly
 from ahv_analysis.command.replay import replay
+from ahv_analysis.command.report import report
 from ahv_analysis.command.trim import trim
 from ahv_analysis.errors import BagError, CampaignError, CampaignStopped, GraphError
-from ahv_analysis.report.report import report
 from ahv_msgs_py.parameters import ParameterError
 
 WRONG_INPUT = (UsageError, ParameterError, BagError, CampaignError, OSError)

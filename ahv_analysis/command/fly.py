@@ -92,7 +92,7 @@ def fly(
     from ahv_analysis.bag.reader import flight_of, read
     from ahv_analysis.flight.case import load_case
     from ahv_analysis.flight.library import fly_library
-    from ahv_analysis.flight.summary import missing_states, summarize
+    from ahv_analysis.report.summary import missing_states, summarize
 
     if engine == Engine.library and (realtime or processes or network):
         raise UsageError(

@@ -21,18 +21,19 @@ from ahv_analysis.bag.info import bag_info
 from ahv_analysis.bag.reader import load_bag
 from ahv_analysis.bag.recovery import recover
 from ahv_analysis.errors import BagError, GraphError
-from ahv_analysis.faults.faulty_node import INJECT
+from ahv_analysis.faults.faulty_node import INJECT, faulty
 from ahv_analysis.faults.whole_flights import fly_with, whole_flight_faults
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.process_per_node import (
     LONGEST_START,
+    NodeChange,
     ProcessGraph,
 )
-from ahv_analysis.flight.summary import summarize
 from ahv_analysis.flight.watcher import Watcher
 from ahv_analysis.interrupt import signals_wait
 from ahv_analysis.report.page import render
 from ahv_analysis.report.page_flight import read_flights
+from ahv_analysis.report.summary import summarize
 from ahv_msgs_py.graph import controllers, listeners
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.log_folder import log_where_it_can
@@ -242,12 +243,14 @@ def run_campaign(
 
 
 @contextmanager
-def _watched_flight(bag: Path, can_fail: bool) -> Iterator[tuple[Spectator, ProcessGraph]]:
+def _watched_flight(
+    bag: Path, change: NodeChange | None = None
+) -> Iterator[tuple[Spectator, ProcessGraph]]:
     """Fly while somebody looks on; a signal ends it in order, and the looks at once."""
     keep_to_this_machine()
     log_where_it_can()
     case = load_case(CASE, {"duration": 3600.0})
-    graph = ProcessGraph(case, bag, realtime=True, spectators=1, can_fail=can_fail)
+    graph = ProcessGraph(case, bag, realtime=True, spectators=1, change=change)
     with signals_wait() as interrupted:
         spectator = Spectator(interrupted)
         try:
@@ -268,7 +271,7 @@ def _disturbed_flight(
 ) -> dict[str, Any]:
     """One flight with the injections of a plan."""
     unexpected: list[str] = []
-    with _watched_flight(bag, can_fail=True) as (spectator, graph):
+    with _watched_flight(bag, faulty) as (spectator, graph):
         for kind, target, length in plan:
             done.append(_inject(spectator, graph, kind, target, length))
             unexpected += [f"{name}: {code}" for name, code in graph.ended().items()]
@@ -278,7 +281,7 @@ def _disturbed_flight(
 
 def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
     """One flight that loses its recorder, and then its plant, and gets a new one."""
-    with _watched_flight(bag, can_fail=False) as (spectator, graph):
+    with _watched_flight(bag) as (spectator, graph):
         killed = spectator.stamp
         graph.kill("recorder")
         spectator.look(SETTLE)

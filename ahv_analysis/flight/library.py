@@ -4,14 +4,13 @@
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
+from ahv_analysis.bag.record import Step
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.closed_loop import Loop, loop_step, start_loop
 from ahv_analysis.interrupt import signals_wait
-from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
-from ahv_control.law import Commands
+from ahv_control.disturbance_learner import disturbance_estimate
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.topics import (
@@ -26,21 +25,11 @@ from ahv_msgs_py.topics import (
     LoopTopic,
 )
 from ahv_plant.model.constants import STEP, STEP_NS
-from ahv_plant.model.vectors import Rates, State
+from ahv_plant.model.vectors import Rates
 from ahv_plant.termination import termination_reason
 
 CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
 INTERRUPTED = "interrupted"  # why a flight ended early, where a signal does not end the program
-
-
-class Step(NamedTuple):
-    """One step of a flight: the state and what the flight control answers."""
-
-    stamp: int  # [ns]
-    state: State
-    commands: Commands
-    learner: LearnerState | None
-    ended_early: str  # why this is the last step before its time; empty if it is not
 
 
 def fly(case: Case) -> Iterator[Step]:

@@ -12,7 +12,7 @@ from ahv_control.intermediate_loop import rate_command
 from ahv_control.outer_loop import attitude_command
 from ahv_control.velocity_loop import throttle_command
 from ahv_plant.model.vectors import Rates
-from ahv_plant.parameters import DEFAULT_START
+from ahv_plant.start import DEFAULT_START
 from ahv_plant.termination import termination_reason
 from ahv_plant.vehicle import vehicle_step
 

@@ -17,7 +17,6 @@ from types import TracebackType
 import rclpy
 
 from ahv_analysis.errors import GraphError
-from ahv_analysis.faults.faulty_node import faulty
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.library import INTERRUPTED
 from ahv_analysis.interrupt import SIGNALS, signals_wait
@@ -33,6 +32,8 @@ from ahv_msgs_py.parameters import Value
 from ahv_plant.plant_node import PlantNode
 
 SAFE_PATH = "PYTHONSAFEPATH"
+NodeChange = Callable[[type[BaseNode]], type[BaseNode]]  # goes to the processes by its name
+
 LONGEST_START = 30.0  # [s] until the first state
 LONGEST_SILENCE = 10.0  # [s] without a sign of the plant, after which the graph has failed
 LONGEST_END = 10.0  # [s] for a process to end by itself
@@ -74,7 +75,7 @@ class FlightReport:
 def _run_node(
     name: str,
     values: dict[str, Value],
-    can_fail: bool,
+    change: NodeChange | None,
     environment: dict[str, str],
     report: FlightReport,
     source: str,
@@ -93,8 +94,8 @@ def _run_node(
     if values[REALTIME.name]:
         take_precedence()  # at once: a node that is started again in flight is missed
     kind = NODES[name].node_class
-    if can_fail and NODES[name].sends:
-        kind = faulty(kind)
+    if change is not None and NODES[name].sends:
+        kind = change(kind)
 
     def make() -> BaseNode:
         node = kind(values)
@@ -127,13 +128,14 @@ class ProcessGraph:
         bag: Path | None,
         realtime: bool,
         spectators: int = 0,
-        can_fail: bool = False,
+        change: NodeChange | None = None,
     ):
         """Prepare the nodes of `case`; nothing runs yet.
 
-        `spectators` listen to the state from outside; nodes that `can_fail` do so when told to.
+        `spectators` listen to the state from outside; `change` makes others of the
+        classes of the nodes that send in the loop.
         """
-        self._can_fail = can_fail
+        self._change = change
         self._source = source_hash()
         self.controllers = case.controllers
         listeners = len(self.controllers) + (bag is not None) + spectators
@@ -183,7 +185,7 @@ class ProcessGraph:
         }
         process = self._context.Process(
             target=_run_node,
-            args=(name, self.values[name], self._can_fail, environment, self.report, self._source),
+            args=(name, self.values[name], self._change, environment, self.report, self._source),
             name=name,
             daemon=True,
         )

@@ -14,9 +14,9 @@ from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.errors import BagError
 from ahv_analysis.flight.case import Case, make_case
 from ahv_analysis.flight.outcome import Cause
-from ahv_analysis.flight.summary import failure
 from ahv_analysis.quantities import Settings
 from ahv_analysis.report.metrics import measure, why_ended_early
+from ahv_analysis.report.summary import failure
 from ahv_plant.model.constants import DEGREES
 
 TUMBLING_RATE = 60.0 / DEGREES  # [rad/s] body rate at which a vehicle is lost

@@ -1,5 +1,5 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""The studies behind docs/results.md: `python -m ahv_analysis.campaign.campaign_study`.
+"""The studies behind docs/results.md: `python -m ahv_analysis.studies.results`.
 
 What the cautious start of a protected flight is worth, which vehicles full elevons do not save,
 and what other readings of the report's chapter 5 give.
@@ -13,11 +13,11 @@ import numpy as np
 from ahv_analysis.bag.record import record
 from ahv_analysis.campaign.campaign import RUNS_PER_JOB, Campaign, fly_runs
 from ahv_analysis.campaign.store import Columns
-from ahv_analysis.campaign.study import row
 from ahv_analysis.campaign.summary import exact_interval
 from ahv_analysis.campaign.table import CONTROLLERS, REPORT
 from ahv_analysis.flight.case import Case, load_case, make_case
 from ahv_analysis.flight.library import fly
+from ahv_analysis.studies.adaptive_law import row
 from ahv_control.flight_control import start as start_law
 from ahv_plant.dispersion import Dispersion, Truth
 from ahv_plant.model.constants import (
