@@ -1,0 +1,130 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Whom the graph believes: not who speaks last, nor who has the name, but who was heard first."""
+
+from contextlib import contextmanager
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+
+from ahv_analysis.bag.reader import load_bag
+from ahv_analysis.bag.recorder_node import RecorderNode
+from ahv_analysis.errors import GraphError
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_msgs_py.node.faults import Fault
+from ahv_msgs_py.node.messages import message_class
+from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.subscription import Listener, gids
+from ahv_msgs_py.topics import DIAGNOSTICS, FLIGHT, FLOWN, FLYING, RATE_COMMAND, SURFACE_COMMAND
+
+
+@contextmanager
+def stranger(domain):
+    """A node that is none of the graph's."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node("stranger", context=context)
+    yield node
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+@pytest.mark.parametrize("executor_class", [EventsExecutor, SingleThreadedExecutor])
+def test_every_message_comes_with_the_gid_of_its_publisher(executor_class, domain):
+    """Of two with the same numbers too; and the graph knows them by the same names."""
+    with stranger(domain) as node:
+        message_type, heard = message_class(RATE_COMMAND.layout.type_name), []
+        listener = Listener(
+            node, message_type, "rates", quality(True), lambda data, gid: heard.append((data, gid))
+        )
+        executor = executor_class(context=node.context)
+        executor.add_node(node)
+        publishers = [node.create_publisher(message_type, "rates", quality(True)) for _ in "12"]
+        sent = [RATE_COMMAND.layout.encode(0, (float(number), 0.0, 0.0)) for number in range(2)]
+        for publisher, data in zip(publishers, sent, strict=True):
+            publisher.publish(data)
+        while len(heard) < len(sent):
+            executor.spin_once(0.1)
+        assert [data for data, _ in heard] == sent
+        assert {gid for _, gid in heard} == {*gids(node, "/rates")}
+        listener.close()
+        executor.remove_node(node)
+        executor.shutdown()
+
+
+def test_a_plant_with_two_publishers_of_a_command_refuses_to_fly(domain):
+    with stranger(domain) as node:
+        message_type = message_class(SURFACE_COMMAND.layout.type_name)
+        node.create_publisher(message_type, SURFACE_COMMAND.name, quality(True))
+        while node.count_publishers(SURFACE_COMMAND.name) < 1:
+            pass
+        says = "refused to fly: /ahv/surface_command has 2 publishers"
+        with pytest.raises(GraphError, match=says):
+            fly_graph(load_case("nominal_di", {"duration": 1.0}), None, domain=domain)
+
+
+@pytest.fixture
+def recorder(tmp_path, domain):
+    """A recorder in flight, and a node that can say what it likes."""
+    with stranger(domain) as node:
+        made = RecorderNode({"bag": str(tmp_path / "bag")}, node.context)
+        executor = EventsExecutor(context=node.context)
+        executor.add_node(made)
+        made.bring_up()
+        message_type = message_class(FLIGHT.layout.type_name)
+        plant, liar = (
+            node.create_publisher(message_type, FLIGHT.name, quality(True)) for _ in range(2)
+        )
+        plant.publish(FLIGHT.layout.encode(0, (5.0, 0.0, FLYING)))
+        yield made, executor, plant, liar, node
+        executor.remove_node(made)
+        executor.shutdown()
+        made.destroy_node()
+
+
+def spin(executor, condition):
+    for _ in range(200):
+        if condition():
+            return True
+        executor.spin_once(0.02)
+    return False
+
+
+def test_nobody_but_the_plant_ends_a_recording(recorder):
+    made, executor, _, liar, node = recorder
+    assert spin(executor, lambda: made._bag.counts[FLIGHT.name] == 1)
+    slander = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, quality(True))
+    for name in ("/factory/plant", "/ahv/plant"):
+        status = DiagnosticStatus(name=name, values=[KeyValue(key="over", value="True")])
+        slander.publish(DiagnosticArray(status=[status]))
+    liar.publish(FLIGHT.layout.encode(10_000_000, (5.0, 1.0, FLOWN)))
+    assert spin(executor, lambda: made.health.total[Fault.SECOND_PUBLISHER])
+    assert made._steps is None and not made.finished.done()
+
+
+def test_what_is_sent_again_after_a_pause_is_filed_once(recorder, tmp_path):
+    """Latched topics are sent again to who starts to listen again; what came meanwhile as well."""
+    made, executor, plant, _, _ = recorder
+    assert spin(executor, lambda: made._bag.counts[FLIGHT.name] == 1)
+    made.trigger_deactivate()
+    plant.publish(FLIGHT.layout.encode(10_000_000, (5.0, 1.0, FLYING)))
+    made.trigger_activate()
+    assert spin(executor, lambda: made._bag.counts[FLIGHT.name] == 2)
+    spin(executor, lambda: False)
+    made.conclude()
+    told = load_bag(tmp_path / "bag")[FLIGHT.name].messages
+    assert [FLIGHT.layout.decode(data)[0] for data in told] == [0, 10_000_000]
+
+
+def test_a_bag_that_is_deleted_in_flight_is_missed_at_once(recorder, tmp_path):
+    made, executor, plant, _, _ = recorder
+    assert spin(executor, lambda: made._bag.counts[FLIGHT.name] == 1)
+    (tmp_path / "bag").rename(tmp_path / "elsewhere")
+    plant.publish(FLIGHT.layout.encode(10_000_000, (5.0, 1.0, FLYING)))
+    assert spin(executor, lambda: made.failure or made._bag.failure)
+    plant.publish(FLIGHT.layout.encode(20_000_000, (5.0, 2.0, FLYING)))
+    assert spin(executor, made.finished.done)
+    assert "was deleted" in made.finished.result()
