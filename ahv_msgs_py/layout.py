@@ -10,6 +10,7 @@ deserialized object.
 
 from collections.abc import Sequence
 from struct import Struct
+from struct import error as StructError
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ _ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little-endian, no options
 
 
 _CLOCK = Struct("<4siI")
+_LENGTH = Struct("<I")
 
 
 def clock_bytes(stamp: int) -> bytes:
@@ -40,7 +42,25 @@ def excerpt(text: str) -> str:
 def _string(text: str, offset: int) -> bytes:
     """CDR of a string that starts at `offset` after the encapsulation, its padding before it."""
     data = text.encode() + b"\x00"
-    return bytes(-offset % 4) + Struct("<I").pack(len(data)) + data
+    return bytes(-offset % 4) + _LENGTH.pack(len(data)) + data
+
+
+def text_bytes(text: str) -> bytes:
+    """std_msgs/String as CDR bytes."""
+    return _ENCAPSULATION + _string(text, 0)
+
+
+def text_of(data: bytes) -> str:
+    """The text of a std_msgs/String in CDR bytes, padded or not; MessageError if it is none."""
+    start = len(_ENCAPSULATION) + _LENGTH.size
+    try:
+        (length,) = _LENGTH.unpack_from(data, len(_ENCAPSULATION))
+        text = data[start : start + length].decode()
+    except (StructError, UnicodeDecodeError) as error:
+        raise MessageError(f"the bytes are no text: {error}") from error
+    if data[:4] != _ENCAPSULATION or len(data) < start + length or text[-1:] != "\0":
+        raise MessageError("the bytes are no text")
+    return text[:-1]
 
 
 class Layout:

@@ -1,9 +1,10 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """A vehicle in a namespace, as one of several in a ROS domain, by ROS's own remapping."""
 
-from ahv_msgs_py.topics import CLOCK, NAMESPACE, TRANSFORM
+from ahv_msgs_py.topics import CLOCK, NAMESPACE, STATIC_TRANSFORM, TRANSFORM
 
-OWN = (CLOCK.name, TRANSFORM.name)  # absolute, for tools look there; of several vehicles one each
+# Absolute, for tools look there; of several vehicles each has its own.
+OWN = (CLOCK.name, TRANSFORM.name, STATIC_TRANSFORM.name)
 
 
 def remappings(namespace: str) -> list[tuple[str, str]]:
@@ -12,6 +13,13 @@ def remappings(namespace: str) -> list[tuple[str, str]]:
 
 
 def ros_arguments(namespace: str) -> list[str]:
-    """Arguments of ROS for the nodes of a vehicle in `namespace`."""
+    """Arguments of ROS for the nodes of a vehicle in `namespace`, several of them in a process.
+
+    What they log goes to /rosout, and thereby into the bag; the terminal is the program's.
+    """
     rules = [("__ns", namespace), *remappings(namespace)]
-    return ["--ros-args", *(word for old, new in rules for word in ("-r", f"{old}:={new}"))]
+    return [
+        "--ros-args",
+        "--disable-stdout-logs",
+        *(word for old, new in rules for word in ("-r", f"{old}:={new}")),
+    ]

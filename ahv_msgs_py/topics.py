@@ -154,7 +154,19 @@ TRANSFORM = ViewerTopic(
     "/tf",
     "tf2_msgs/msg/TFMessage",
     8,
-    "map to map_ned to base_link_frd to base_link, at 10 Hz",
+    "map_ned to base_link_frd, at 10 Hz",
+)
+STATIC_TRANSFORM = ViewerTopic(
+    "/tf_static",
+    "tf2_msgs/msg/TFMessage",
+    8,
+    "map to map_ned and base_link_frd to base_link, which do not change, once",
+)
+SETTINGS = ViewerTopic(
+    "/ahv/settings",
+    "std_msgs/msg/String",
+    None,
+    "parameters of every node as JSON, once and again when it starts again",
 )
 DIAGNOSTICS = ViewerTopic(
     "/diagnostics",
@@ -172,6 +184,8 @@ VIEWER_TOPICS = (
     ODOMETRY_ENU,
     MARKER,
     TRANSFORM,
+    STATIC_TRANSFORM,
+    SETTINGS,
     DIAGNOSTICS,
     LOG,
     PARAMETER_EVENTS,

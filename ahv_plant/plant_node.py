@@ -36,10 +36,12 @@ from ahv_msgs_py.topics import (
     ODOMETRY_ENU,
     ROBOTICS_FRAMES,
     STATE,
+    STATIC_TRANSFORM,
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
     TRANSFORM,
     LoopTopic,
+    ViewerTopic,
 )
 from ahv_plant.model.constants import STEP, STEP_NS
 from ahv_plant.model.vectors import State, Surfaces
@@ -116,16 +118,19 @@ class PlantNode(BaseNode):
         self._odometry = self.publisher(ODOMETRY.type_name, ODOMETRY.name, viewers)
         self._odometry_enu = self.publisher(ODOMETRY_ENU.type_name, ODOMETRY_ENU.name, viewers)
         self._marker = self.publisher(MARKER.type_name, MARKER.name, viewers)
-        self._transform = self._transform_publisher(viewers)
+        self._transform = self._transform_publisher(TRANSFORM, viewers)
+        self._static_transform = self._transform_publisher(STATIC_TRANSFORM, quality(True, 1))
         self._send_flight = self.sender(FLIGHT)
         self._send_state = self.sender(STATE, self._listeners_changed)
 
-    def _transform_publisher(self, viewers: QoSProfile) -> Any:
-        """Return a publisher of /tf, or None: tf2_msgs is part of ROS 2, but not on PyPI."""
+    def _transform_publisher(self, topic: ViewerTopic, qos: QoSProfile) -> Any:
+        """Return what publishes transforms, at best: tf2_msgs is in ROS 2, but not on PyPI."""
         try:
-            return self.publisher(TRANSFORM.type_name, TRANSFORM.name, viewers)
+            publisher = self.publisher(topic.type_name, topic.name, qos)
         except ModuleNotFoundError:
-            return None
+            return lambda transforms: None
+        message_type = message_class(topic.type_name)
+        return lambda transforms: publisher.publish(message_type(transforms=transforms))
 
     def _listeners_changed(self, matched: Any) -> None:
         """Start the flight when as many listen as should; say so when some have gone."""
@@ -285,21 +290,15 @@ class PlantNode(BaseNode):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, until - time.monotonic())))
 
     def _publish_for_viewers(self, stamp: int) -> None:
-        """Send pose and velocity in both conventions; the body once, it moves with its frame."""
+        """Send pose and velocity in both conventions; once what does not change."""
         ned, enu = ned_pose(self.state), enu_pose(self.state)
         self._odometry.publish(_odometry(stamp, ned, EARTH_FRAME, BODY_FRAME))
         self._odometry_enu.publish(_odometry(stamp, enu, *ROBOTICS_FRAMES))
         if self.step == 0:
             self._marker.publish(_marker(stamp))
-        if self._transform is not None:
-            still = (0.0, 0.0, 0.0)
-            earth, body = ROBOTICS_FRAMES
-            transforms = [
-                _transform(stamp, earth, EARTH_FRAME, still, NED_IN_ENU),
-                _transform(stamp, EARTH_FRAME, BODY_FRAME, ned.position, ned.attitude),
-                _transform(stamp, BODY_FRAME, body, still, FLU_IN_FRD),
-            ]
-            self._transform.publish(message_class(TRANSFORM.type_name)(transforms=transforms))
+            self._static_transform(static_transforms(stamp))
+        moved = _transform(stamp, EARTH_FRAME, BODY_FRAME, ned.position, ned.attitude)
+        self._transform([moved])
 
 
 def _head(header: Any, stamp: int, frame: str) -> None:
@@ -332,6 +331,16 @@ def _transform(
     message.transform.rotation = _attitude(turn)
     _head(message.header, stamp, parent)
     return message
+
+
+def static_transforms(stamp: int) -> list[TransformStamped]:
+    """Between the frames of aviation and those of robotics, at `stamp` [ns]."""
+    earth, body = ROBOTICS_FRAMES
+    still = (0.0, 0.0, 0.0)
+    return [
+        _transform(stamp, earth, EARTH_FRAME, still, NED_IN_ENU),
+        _transform(stamp, BODY_FRAME, body, still, FLU_IN_FRD),
+    ]
 
 
 def _marker(stamp: int) -> Marker:

@@ -3,25 +3,31 @@
 
     ros2 launch ahv flight.launch.py case:=nominal_di out:=flights/first
 
-`ros2 launch ahv flight.launch.py --show-args` lists the arguments. The nodes come up in order: the
+`ros2 launch ahv flight.launch.py --show-args` lists the arguments. What can be refused is refused
+before a node starts: a case, a dispersion, a bag that exists. The nodes come up in order: the
 recorder, the controllers, then the plant, which starts to fly when all of them listen. A node that
-ends before its time, as one that refuses a parameter does, ends the launch; in real time a
-controller is started again instead, and the flight goes on.
+fails, as a plant that loses its vehicle does, fails the launch; in real time a controller is
+started again instead, and the flight goes on.
 """
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 
-import yaml
-from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown, TimerAction
+from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from ahv_msgs_py.graph import controllers
+from ahv_analysis.flight.case import load_case, load_dispersion
+from ahv_msgs_py.config import config_folder
+from ahv_msgs_py.namespace import remappings
+from ahv_msgs_py.topics import NAMESPACE
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 DRAIN = 2.0  # [s] for the recorder to take what is still under way
+REFUSED = 2  # exit code of a node that cannot be set up
 ARGUMENTS = {
     "case": ("nominal_di", "Name of a case in share/ahv/config/cases, or path of a YAML file."),
     "dispersion": ("", "YAML file of the vehicle's dispersion; that of the case, if empty."),
@@ -29,6 +35,8 @@ ARGUMENTS = {
     "network": ("false", "true: other machines hear the graph and speak to it; false: none does."),
     "record": ("true", "Whether a recorder flies along."),
     "out": ("flight", "Folder for the bag, which must not have one: OUT/bag."),
+    "namespace": (NAMESPACE, "Of the nodes and topics: vehicles in one ROS domain differ in it."),
+    "listeners": ("0", "Subscribers of the state to wait for, beside the nodes launched here."),
     "autostart": ("true", "false: the nodes wait for `ros2 lifecycle set NODE configure`."),
 }
 
@@ -44,25 +52,68 @@ def generate_launch_description() -> LaunchDescription:
 
 def _nodes(context: LaunchContext) -> list[Node]:
     given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    case = _case_file(given["case"])
+    namespace = f"/{given['namespace'].strip('/')}"
     realtime, record = _truth(given, "realtime"), _truth(given, "record")
     shell = {"realtime": realtime, "autostart": _truth(given, "autostart")}
     # nodes keep to the loopback interface by themselves, unless a range is set
     wide = {"additional_env": {RANGE: "SUBNET"}} if _truth(given, "network") else {}
-    names = controllers(_adaptive(case))
-    plant = [_file(given["dispersion"])] if given["dispersion"] else []
-    plant += [shell | {"listeners": len(names) + record}]
-    bag = str(Path(given["out"]).expanduser().resolve() / "bag")
-    over = TimerAction(period=DRAIN, actions=[Shutdown(reason="the flight is over")])
-    nodes = []
-    if record:
-        # in real time a flight goes on without its recorder
-        end = {} if realtime else {"on_exit": Shutdown(reason="the recorder ended")}
-        nodes += [_node("recorder", [case, shell | {"bag": bag}], **end, **wide)]
-    for name in names:
-        end = {"respawn": True} if realtime else {"on_exit": Shutdown(reason=f"{name} ended")}
-        nodes += [_node(name, [case, shell], **end, **wide)]
-    return [*nodes, _node("plant", [case, *plant], on_exit=over, **wide)]
+    file = _case_file(given["case"])
+    case = load_case(file, namespace=namespace)
+    plant = []
+    if given["dispersion"]:
+        plant = [str(_absolute(given["dispersion"]))]
+        load_dispersion(Path(plant[0]), namespace)
+    plant += [shell | {"listeners": len(case.controllers) + record + _count(given, "listeners")}]
+    bag = _absolute(given["out"]) / "bag"
+    if record and bag.exists():
+        raise FileExistsError(f"cannot write a bag to {bag}: it exists already")
+    notes = json.dumps({"case": case.name})
+    failures: list[str] = []
+
+    def node(name: str, parameters: list[object], **options: object) -> Node:
+        # name and namespace make launch file the parameters under the node, where they win
+        return Node(
+            package="ahv",
+            executable=name,
+            name=name,
+            namespace=namespace,
+            remappings=remappings(namespace),
+            parameters=[file, *parameters],
+            output="screen",
+            on_exit=_end_of(name, failures, realtime),
+            **wide,
+            **options,
+        )
+
+    nodes = [node("recorder", [shell | {"bag": str(bag), "notes": notes}])] if record else []
+    nodes += [node(name, [shell], respawn=realtime) for name in case.controllers]
+    return [*nodes, node("plant", plant)]
+
+
+def _end_of(name: str, failures: list[str], realtime: bool) -> Callable[..., list[object]]:
+    """What follows when a node has ended: in real time a flight goes on without any but the plant.
+
+    A launch whose handlers raise an exception ends with exit code 1, and in no other way.
+    """
+
+    def over(context: LaunchContext) -> list[object]:
+        if failures:
+            raise RuntimeError("; ".join(failures))
+        return [Shutdown(reason=f"{name} has ended")]
+
+    def ended(event: ProcessExited, context: LaunchContext) -> list[object]:
+        code = event.returncode
+        if context.is_shutdown:
+            return []
+        if code and not (realtime and name not in ("plant", "recorder") and code != REFUSED):
+            failures.append(f"{name} ended with exit code {code}")
+        if name == "plant":
+            return [TimerAction(period=DRAIN, actions=[OpaqueFunction(function=over)])]
+        if code == REFUSED or not (realtime or (name == "recorder" and code == 0)):
+            return over(context)
+        return []
+
+    return ended
 
 
 def _truth(given: dict[str, str], name: str) -> bool:
@@ -72,35 +123,19 @@ def _truth(given: dict[str, str], name: str) -> bool:
     return given[name].lower() == "true"
 
 
+def _count(given: dict[str, str], name: str) -> int:
+    """Value of an argument that is a number of things."""
+    if not given[name].isdecimal():
+        raise ValueError(f"{name} is {given[name]!r}, but must be an integer from 0 on")
+    return int(given[name])
+
+
 def _case_file(case: str) -> str:
     """Path of the parameter file of a case."""
     if Path(case).suffix in (".yaml", ".yml"):
-        return _file(case)
-    share = Path(get_package_share_directory("ahv"))
-    return _file(str(share / "config" / "cases" / f"{case}.yaml"))
+        return str(_absolute(case))
+    return str(config_folder() / "cases" / f"{case}.yaml")
 
 
-def _file(name: str) -> str:
-    file = Path(name).expanduser().resolve()
-    if not file.is_file():
-        raise FileNotFoundError(f"there is no file {file}")
-    return str(file)
-
-
-def _adaptive(case: str) -> bool:
-    """Whether the case's parameter file has an adaptive inner loop."""
-    sections = yaml.safe_load(Path(case).read_text())
-    return any(body["ros__parameters"].get("adaptive") for body in sections.values())
-
-
-def _node(name: str, parameters: list[object], **options: object) -> Node:
-    # name and namespace make launch file the parameters under the node, where they win
-    return Node(
-        package="ahv",
-        executable=name,
-        name=name,
-        namespace="/ahv",
-        parameters=parameters,
-        output="screen",
-        **options,
-    )
+def _absolute(name: str) -> Path:
+    return Path(name).expanduser().resolve()

@@ -12,6 +12,7 @@ import sys
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
+from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 
 ARGUMENTS = ("bag", "nodes", "parameters", "rate", "out")
@@ -56,5 +57,11 @@ def _replay(context: LaunchContext) -> list[ExecuteProcess]:
     for name in ("parameters", "rate", "out"):
         if given[name]:
             command += [f"--{name}", given[name]]
-    over = Shutdown(reason="the replay is over")
-    return [ExecuteProcess(cmd=command, output="screen", on_exit=over)]
+    return [ExecuteProcess(cmd=command, output="screen", on_exit=_ended)]
+
+
+def _ended(event: ProcessExited, context: LaunchContext) -> list[Shutdown]:
+    """End as the replay has; only an exception gives a launch another exit code than 0."""
+    if event.returncode and not context.is_shutdown:
+        raise RuntimeError(f"the replay ended with exit code {event.returncode}")
+    return [Shutdown(reason="the replay is over")]

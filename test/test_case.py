@@ -68,14 +68,14 @@ def test_shared_parameters_reach_every_node_that_knows_them(tmp_path):
         (("h: 24100.0", "h: 47500.0"), ("plant", "altitude", "47500", "0 to 47000 m")),
         (("u: 1836.4", "u: 800.0"), ("plant", "speed", "800", "Mach 4 to 24")),
         (("mass: 136077.6", "mass: 1.0"), ("initial.mass", "1.0", "60000 to 140000 kg")),
-        (("/ahv/velocity", "/ahv/speed"), ("/ahv/speed", "/ahv/velocity")),
+        (("/**/velocity", "/ahv/speed"), ("/ahv/speed", "/**/velocity")),
         (("geometric_altitude: false", "geometric: 1"), ("'geometric'",)),
         (
             ("geometric_altitude: false", "geometric_altitude: 1"),
             ("geometric_altitude", "true or"),
         ),
-        (("  ros__parameters:\n    k_P", "  parameters:\n    k_P"), ("/ahv/inner_loop", "ros__")),
-        (("/ahv/velocity:", "]["), ("not a readable YAML",)),
+        (("  ros__parameters:\n    k_P", "  parameters:\n    k_P"), ("/**/inner_loop", "ros__")),
+        (("/**/velocity:", "]["), ("not a readable YAML",)),
         (("k_P: 2.0", "geometric_altitude: true"), ("geometric_altitude", "/**", "once")),
     ],
 )

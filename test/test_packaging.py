@@ -1,6 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The package installs by pip and by colcon alike: executables, index, cases, launch file."""
 
+import json
 import runpy
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ import pytest
 from ahv_analysis.flight.case import case_names, load_case
 from ahv_msgs_py.graph import NODES, controllers
 from ahv_msgs_py.node.network import DISCOVERY_RANGE
+from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 
 ROOT = Path(__file__).parent.parent
@@ -156,14 +158,12 @@ class Noted(SimpleNamespace):
 @pytest.fixture
 def launch(monkeypatch):
     """The launch file: what it starts for given arguments, as options of nodes by name."""
-    for name in ("launch", "launch.actions", "launch.substitutions", "launch_ros.actions"):
+    names = ("launch", "launch.actions", "launch.substitutions", "launch.events.process")
+    for name in (*names, "launch_ros.actions"):
         module = ModuleType(name)
         module.__getattr__ = lambda _: Noted
         monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.setitem(sys.modules, "launch_ros", ModuleType("launch_ros"))
-    monkeypatch.setattr(
-        "ament_index_python.packages.get_package_share_directory", lambda _: str(ROOT)
-    )
     description = runpy.run_path(str(ROOT / "launch" / "flight.launch.py"))
     *arguments, start = description["generate_launch_description"]().values[0]
     defaults = {argument.values[0]: argument.default_value for argument in arguments}
@@ -209,7 +209,8 @@ def test_launch_starts_a_process_per_node_from_one_case(launch, setup):
         assert (node.package, node.executable, node.namespace) == ("ahv", name, "/ahv")
         assert node.parameters[0] == str(ROOT / "config" / "cases" / "nominal_di.yaml")
     bag = str(Path("flights/one/bag").resolve())
-    assert nodes["recorder"].parameters[1:] == [LOCKSTEP | {"bag": bag}]
+    notes = json.dumps({"case": "nominal_di"})
+    assert nodes["recorder"].parameters[1:] == [LOCKSTEP | {"bag": bag, "notes": notes}]
     assert nodes["plant"].parameters[1:] == [LOCKSTEP | {"listeners": 4}]
     assert all(hasattr(node, "on_exit") for node in nodes.values())
 
@@ -244,5 +245,61 @@ def test_launch_names_what_is_neither_true_nor_false(launch):
 def test_launch_takes_a_file_and_names_one_that_is_not_there(launch):
     file = ROOT / "config" / "cases" / "nominal_di.yaml"
     assert launch(case=str(file))["plant"].parameters[0] == str(file)
-    with pytest.raises(FileNotFoundError, match=r"there is no file .*typo\.yaml"):
+    with pytest.raises(ParameterError, match=r"typo\.yaml' is neither a YAML file nor one of"):
         launch(case="typo")
+
+
+def test_launch_refuses_before_a_node_starts_what_would_be_refused_then(launch, tmp_path):
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(FileExistsError, match=f"cannot write a bag to {tmp_path}/bag: it exists"):
+        launch(out=str(tmp_path))
+    assert launch(out=str(tmp_path), record="false")
+    case = tmp_path / "case.yaml"
+    case.write_text("/**/plant: {ros__parameters: {duration: -3.0}}")
+    with pytest.raises(ParameterError, match=r"plant: duration is -3\.0"):
+        launch(case=str(case))
+    with pytest.raises(ParameterError, match="plant: duration has no place in a disp"):
+        case.write_text("/**/plant: {ros__parameters: {duration: 3.0}}")
+        launch(dispersion=str(case))
+    with pytest.raises(ValueError, match="listeners is '-1', but must be an integer from 0 on"):
+        launch(listeners="-1")
+
+
+def test_launch_puts_a_vehicle_into_a_namespace_with_a_clock_of_its_own(launch, tmp_path):
+    nodes = launch(namespace="uav1", listeners="2")
+    for node in nodes.values():
+        assert node.namespace == "/uav1"
+        assert ("/clock", "clock") in node.remappings and ("/tf", "tf") in node.remappings
+    assert nodes["plant"].parameters[1]["listeners"] == 4 + 2
+    assert all(node.remappings == [] for node in launch().values())
+    case = tmp_path / "case.yaml"
+    case.write_text("/ahv/plant: {ros__parameters: {duration: 3.0}}")
+    assert launch(case=str(case))
+    with pytest.raises(ParameterError, match=r"no node '/ahv/plant'; valid are"):
+        launch(case=str(case), namespace="/uav1")
+
+
+def ending(node, code, shut=False):
+    """Return what follows when a node ends with an exit code, as names of actions."""
+    context = SimpleNamespace(is_shutdown=shut)
+    actions = node.on_exit(SimpleNamespace(returncode=code), context)
+    later = [action for one in actions for action in getattr(one, "actions", ())]
+    return [end for one in later for end in one.function(context)] or actions
+
+
+def test_a_node_that_fails_fails_the_launch(launch):
+    """launch ends with exit code 1 if a handler raises, and with 0 however its processes ended."""
+    nodes = launch()
+    assert ending(nodes["plant"], 0) and ending(nodes["velocity"], 0)
+    assert ending(nodes["recorder"], 0) == [], "the plant is still to end"
+    for name in nodes:
+        with pytest.raises(RuntimeError, match=f"^{name} ended with exit code 2$"):
+            ending(launch()[name], 2)
+        assert ending(launch()[name], 2, shut=True) == []
+    nodes = launch(realtime="true")
+    assert ending(nodes["velocity"], -9) == [], "it is started again"
+    assert ending(nodes["recorder"], 1) == [], "the flight goes on without a record"
+    with pytest.raises(RuntimeError, match="recorder ended with exit code 1"):
+        ending(nodes["plant"], 0)
+    with pytest.raises(RuntimeError, match="velocity ended with exit code 2"):
+        ending(launch(realtime="true")["velocity"], 2)

@@ -124,7 +124,7 @@ def test_a_flight_on_the_graph_replays_and_at_a_chosen_rate(tmp_path, domain):
 def test_one_percent_of_one_gain_is_found(
     ahv, bags, changed_case, node, parameter, topic, field, time_s
 ):
-    file = changed_case(ADAPTIVE, f"/ahv/{node}", parameter, 1.01)
+    file = changed_case(ADAPTIVE, f"/**/{node}", parameter, 1.01)
     result = ahv("replay", bags / ADAPTIVE, "--parameters", file, "--json")
     found = json.loads(result.stdout)
     first = found["first"]
@@ -408,7 +408,8 @@ def test_wrong_input_is_named(ahv, bags, tmp_path, arguments, words):
 @pytest.fixture
 def launch(monkeypatch):
     """The launch file: the command that it runs for given arguments."""
-    for name in ("launch", "launch.actions", "launch.substitutions"):
+    names = ("launch", "launch.actions", "launch.substitutions", "launch.events.process")
+    for name in names:
         module = ModuleType(name)
         module.__getattr__ = lambda _: Noted
         monkeypatch.setitem(sys.modules, name, module)
@@ -421,6 +422,11 @@ def launch(monkeypatch):
 
     def run(**given):
         (process,) = start.function(defaults | given)
+        context = SimpleNamespace(is_shutdown=False)
+        assert process.on_exit(SimpleNamespace(returncode=0), context)
+        for code in (1, 2):  # commands that differ, and a replay that was refused
+            with pytest.raises(RuntimeError, match=f"the replay ended with exit code {code}"):
+                process.on_exit(SimpleNamespace(returncode=code), context)
         return process.cmd
 
     return run

@@ -1,8 +1,9 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Node `recorder`: every topic of the graph into an MCAP bag, the bytes as they came."""
 
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +12,11 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
+from ahv_analysis.versions import versions
+from ahv_msgs_py.graph import case_nodes
+from ahv_msgs_py.layout import MessageError, text_of
 from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.guard import Guard, Refusal
 from ahv_msgs_py.node.health import ERROR, OK, WARN
 from ahv_msgs_py.node.messages import general_reader, message_class
@@ -24,15 +29,19 @@ from ahv_msgs_py.topics import (
     FLYING,
     LOOP_TOPICS,
     NOMINAL_TOPICS,
+    SETTINGS,
     VIEWER_TOPICS,
     LoopTopic,
     relative,
 )
 
 STOP, CONTINUE = "stop", "continue"
+UNNAMED = "unnamed"  # case of nodes that were started by hand
 RECORDER_PARAMETERS = (
     Parameter("bag", "bag", "folder of the bag to write; it must not exist"),
-    Parameter("notes", "", "text to file with the bag"),
+    Parameter(
+        "notes", "", "text to file with the bag; with JSON, parameters and versions are added"
+    ),
     Parameter(
         "on_error",
         STOP,
@@ -66,6 +75,7 @@ class RecorderNode(BaseNode):
         self.failure: BagError | None = None
         self._bag: BagWriter | None = None
         self._numbers: dict[str, dict[bytes, int]] = {}  # of the publishers of a topic, by GID
+        self._told: dict[str, dict[str, Value]] = {}  # settings of the nodes that fly
         self._polls = 0
         self._filed: dict[tuple[str, bytes], int] = {}  # newest message of topic and publisher
         self._steps: int | None = None  # of the flight, once it is over
@@ -115,7 +125,7 @@ class RecorderNode(BaseNode):
         timer = self.create_timer(POLL, self._poll)
         self._opened.append(partial(self.destroy_timer, timer))
         self._opened.append(self._take)  # first of all to be done when the topics are closed
-        self.announce(0, OK, f"recording to {self._bag.path}")
+        self.announce(self._bag.now, OK, f"recording to {self._bag.path}")
 
     def _poll(self) -> None:
         """Take what has come; see whether that was all."""
@@ -148,6 +158,8 @@ class RecorderNode(BaseNode):
             if topic == FLIGHT.name:
                 for data, publisher, _ in taken:
                     self._read_flight(data, publisher)
+            if topic == SETTINGS.name and messages and self.failure is None:
+                self._read_settings(messages)
 
     def _is_new(self, topic: str, data: bytes, publisher: bytes, number: int) -> bool:
         """Whether a message is not in the bag yet: who starts to listen again is sent it again."""
@@ -187,6 +199,17 @@ class RecorderNode(BaseNode):
         self.announce(self._bag.now, WARN, "not recording: deactivated")
         return super().on_deactivate(state)
 
+    def _read_settings(self, messages: Sequence[bytes]) -> None:
+        """Learn how the nodes fly, and note it."""
+        for data in messages:
+            try:
+                node, settings = told_of(data)
+            except MessageError as error:
+                self.fault(self._bag.now, Fault.MALFORMED, f"{SETTINGS.name}: {error}")
+            else:
+                self._told |= {node: settings} if node in case_nodes() else {}
+        self._bag.annotate(completed(str(self.settings["notes"]), self._told))
+
     def missing(self, topics: Sequence[LoopTopic], steps: int) -> int:
         """How many messages of these topics are still to come from a flight of so many steps."""
         return sum(max(0, steps + 1 - self._bag.counts[topic.name]) for topic in topics)
@@ -205,6 +228,30 @@ class RecorderNode(BaseNode):
                 if self.failure is None:
                     self._fail(error)
         self._bag = None
+
+
+def told_of(data: bytes) -> tuple[str, dict[str, Value]]:
+    """A node and its settings as it told them; MessageError if they are none."""
+    try:
+        told = json.loads(text_of(data))
+        return str(told["node"]), dict(told["settings"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise MessageError(f"no settings of a node: {error}") from error
+
+
+def completed(notes: str, told: Mapping[str, Mapping[str, Value]]) -> str:
+    """Notes with what nodes told of their settings, where they do not say it themselves.
+
+    What is no JSON object is somebody's own text, and stays as it is.
+    """
+    try:
+        content = json.loads(notes or "{}")
+    except ValueError:
+        return notes
+    if not isinstance(content, dict):
+        return notes
+    content = {"case": UNNAMED, "versions": versions()} | content
+    return json.dumps(content | {"parameters": {**told, **content.get("parameters", {})}})
 
 
 def main() -> None:

@@ -113,7 +113,7 @@ class BagWriter:
             raise BagError(f"cannot write a bag to {path}: it exists already") from error
         except OSError as error:
             raise BagError(f"cannot write a bag to {path}: {error.strerror}") from error
-        self._pending: SimpleQueue[_Chunk | None] = SimpleQueue()
+        self._pending: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._thread: Thread | None = None
         if background:
             self._thread = Thread(target=self._work, name="bag writer", daemon=True)
@@ -161,11 +161,12 @@ class BagWriter:
             self.failure = BagError(f"the bag {self.path} was deleted at {end:g} s of the flight")
         most = max(len(inbox.messages) for inbox in self._inboxes.values())
         for _ in range(ceil(most / LONGEST)):
-            chunk = self._chunk()
-            if self._thread is None:
-                self._add(chunk)
-            else:
-                self._pending.put(chunk)
+            self._do(partial(self._file.add_chunk, *self._chunk()))
+
+    def annotate(self, notes: str) -> None:
+        """File notes in place of those before; a bag that is cut off has them as well."""
+        self._custom[NOTES] = notes
+        self._do(partial(self._file.add_metadata, metadata_record(self._metadata())))
 
     def close(self) -> None:
         """Write index and metadata; after this the bag is complete. BagError if it cannot be."""
@@ -173,21 +174,25 @@ class BagWriter:
         if self._thread is not None:
             self._pending.put(None)
             self._thread.join()
-        if self.failure is None:
-            self._guarded(self._finish)
+        self._guarded(self._finish)
         if self.failure is not None:
             self._file.close()
             raise self.failure
 
-    def _work(self) -> None:
-        for chunk in iter(self._pending.get, None):
-            self._add(chunk)
+    def _do(self, task: Callable[[], None]) -> None:
+        """Have the disk written to, here or in the background."""
+        if self._thread is None:
+            self._guarded(task)
+        else:
+            self._pending.put(task)
 
-    def _add(self, chunk: _Chunk) -> None:
-        if self.failure is None:
-            self._guarded(partial(self._file.add_chunk, *chunk))
+    def _work(self) -> None:
+        for task in iter(self._pending.get, None):
+            self._guarded(task)
 
     def _guarded(self, task: Callable[[], None]) -> None:
+        if self.failure is not None:
+            return
         try:
             task()
         except OSError as error:

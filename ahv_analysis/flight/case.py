@@ -67,12 +67,15 @@ def case_names() -> list[str]:
 
 
 def load_case(
-    name: str, plant: Mapping[str, object] | None = None, draw: Draw | None = None
+    name: str,
+    plant: Mapping[str, object] | None = None,
+    draw: Draw | None = None,
+    namespace: str = NAMESPACE,
 ) -> Case:
     """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
 
     `plant` replaces parameters of the plant: a dispersion, another start or duration; `draw` says
-    where the dispersion comes from, if it was drawn.
+    where the dispersion comes from, if it was drawn. The file is read as nodes in `namespace` do.
     """
     path = Path(name)
     if path.suffix not in (".yaml", ".yml"):
@@ -81,7 +84,7 @@ def load_case(
         raise ParameterError(
             f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
         )
-    given = _read(path)
+    given = _read(path, namespace)
     given["plant"] |= plant or {}
     return make_case(path.stem, given, draw)
 
@@ -91,9 +94,9 @@ def dispersion_parameters(dispersion: Dispersion) -> dict[str, object]:
     return {f"dispersion.{name}": value for name, value in dispersion._asdict().items()}
 
 
-def load_dispersion(path: Path) -> dict[str, object]:
+def load_dispersion(path: Path, namespace: str = NAMESPACE) -> dict[str, object]:
     """Plant parameters of a dispersion file: a ROS parameter file with the plant alone."""
-    given = _read(path)
+    given = _read(path, namespace)
     for node, values in given.items():
         for name in values:
             if node != "plant" or not name.startswith(("dispersion.", "disturbance.")):
@@ -109,7 +112,7 @@ def make_case(
 ) -> Case:
     """Case of the parameters `given` for each node; ParameterError names what is wrong."""
     parameters = {
-        node: check_parameters(f"{name}: {node}", NODES[node].parameters, given[node])
+        node: check_parameters(f"{name}: {node}", NODES[node].parameters, given.get(node, {}))
         for node in case_nodes()
     }
     adaptive = parameters["inner_loop"]["adaptive"]
@@ -123,10 +126,16 @@ def make_case(
     return Case(name, parameters, plant_settings(parameters["plant"]), control, draw)
 
 
-def _read(path: Path) -> dict[str, dict[str, object]]:
+def _read(path: Path, namespace: str) -> dict[str, dict[str, object]]:
     """Parameters per node as the file gives them, those of `/**` given to all that know them."""
     sections = read_parameter_file(path)
-    valid = [EVERY_NODE] + [f"{NAMESPACE}/{node}" for node in case_nodes()]
+    # of one node in any namespace, or in its own, as ROS has it
+    places = {
+        f"{where.rstrip('/')}/{node}": node
+        for where in (EVERY_NODE, namespace)
+        for node in case_nodes()
+    }
+    valid = [EVERY_NODE, *places]
     if not sections:
         raise ParameterError(f"{path.name}: must have sections {', '.join(valid)}")
     for section in sections:
@@ -140,15 +149,18 @@ def _read(path: Path) -> dict[str, dict[str, object]]:
             raise ParameterError(
                 f"{path.name}: {EVERY_NODE}: {name!r} is not one of {', '.join(SHARED)}"
             )
-    for section, body in sections.items():
-        twice = sorted(shared.keys() & body.keys()) if section != EVERY_NODE else []
+    own: dict[str, dict[str, object]] = {node: {} for node in case_nodes()}
+    for section, node in places.items():
+        body = sections.get(section, {})
+        twice = sorted((shared.keys() | own[node].keys()) & body.keys())
         if twice:
+            other = EVERY_NODE if twice[0] in shared else f"{EVERY_NODE}/{node}"
             raise ParameterError(
-                f"{path.name}: {twice[0]} stands in {EVERY_NODE} and in {section}; once is enough"
+                f"{path.name}: {twice[0]} stands in {other} and in {section}; once is enough"
             )
+        own[node] |= body
     return {
-        node: {name: shared[name] for name in shared if name in known}
-        | sections.get(f"{NAMESPACE}/{node}", {})
+        node: {name: shared[name] for name in shared if name in known} | own[node]
         for node in case_nodes()
         for known in [{parameter.name for parameter in NODES[node].parameters}]
     }

@@ -2,6 +2,7 @@
 """The shell that all nodes share: guarded topics as exact bytes, and the node's health."""
 
 import gc
+import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -13,7 +14,7 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
-from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.layout import NANOSECONDS, text_bytes
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.guard import Guard, Refusal
 from ahv_msgs_py.node.health import ERROR, OK, WARN, Health
@@ -24,8 +25,18 @@ from ahv_msgs_py.node.real_time import reserve_memory
 from ahv_msgs_py.node.subscription import Listener, gids
 from ahv_msgs_py.node.synchronizer import Fallback, RealTimeSteps, Stepwise, Values
 from ahv_msgs_py.parameters import Parameter, Value
-from ahv_msgs_py.topics import DIAGNOSTICS, FLIGHT, FLYING, QUEUE_DEPTH, STATE, LoopTopic, relative
+from ahv_msgs_py.topics import (
+    DIAGNOSTICS,
+    FLIGHT,
+    FLYING,
+    QUEUE_DEPTH,
+    SETTINGS,
+    STATE,
+    LoopTopic,
+    relative,
+)
 
+LOG_PERIOD = 5.0  # [s] of wall time; a flight in lockstep is thirty times as fast as time
 STATE_LOST_AFTER = 500_000_000  # [ns]
 
 
@@ -47,6 +58,7 @@ class BaseNode(ManagedNode):
         self._state_heard = 0  # [ns] by the steady clock
         self._state_lost = False
         self._flight_over = False  # the plant has told the end of the flight
+        self._logged: dict[Fault, float] = {}  # [s] by the steady clock when each was last
         self.heard: dict[LoopTopic, Guard] = {}  # what the node listens to of the loop
         self._diagnostics = self.create_publisher(
             DiagnosticArray, DIAGNOSTICS.name, quality(True, self.sender_depth)
@@ -64,12 +76,20 @@ class BaseNode(ManagedNode):
             gc.collect()
             gc.freeze()  # what lives until the end need not be looked at again
             gc.disable()  # from here on `_watch` collects, between two steps
+        self._tell_settings()
         super().activate()
 
     def close(self) -> None:
         """Close what was opened."""
         super().close()
         self.heard.clear()
+
+    def _tell_settings(self) -> None:
+        """Let everybody know, also who comes later, how this node flies."""
+        own = {entry.name: self.settings[entry.name] for entry in self.own_parameters}
+        text = json.dumps({"node": self.get_name(), "settings": own})
+        publisher = self.publisher(SETTINGS.type_name, SETTINGS.name, quality(True, depth=1))
+        publisher.publish(text_bytes(text))
 
     # Topics
 
@@ -150,7 +170,16 @@ class BaseNode(ManagedNode):
 
     def _flight_told(self, stamp: int, values: Values) -> None:
         """Learn that the flight is over: from then on no state is missed."""
-        self._flight_over = values[-1] != FLYING
+        over = values[-1] != FLYING
+        if over and not self._flight_over:
+            faults = ", ".join(
+                f"{fault.name.lower().replace('_', ' ')} {count}"
+                for fault, count in self.health.total.items()
+            )
+            self.get_logger().info(
+                f"flight over at {stamp / NANOSECONDS:g} s; faults: {faults or 'none'}"
+            )
+        self._flight_over = over
 
     def _state_came(self, stamp: int, guard: Guard) -> None:
         """Keep the time of the flight; a stamp that goes back starts a new one."""
@@ -218,7 +247,20 @@ class BaseNode(ManagedNode):
         """Count a fault; tell of the first of its kind in every second."""
         if self.health.count(fault, times):
             name = fault.name.lower().replace("_", " ")
-            self.announce(stamp, ERROR if fault.value.error else WARN, f"{name}: {text}")
+            level = ERROR if fault.value.error else WARN
+            self.announce(stamp, level, f"{name}: {text}")
+            self._log(fault, level, f"{name} at {stamp / NANOSECONDS:g} s: {text}")
+
+    def _log(self, fault: Fault, level: bytes, text: str) -> None:
+        """Log a fault at the level of its diagnostics, one of its kind in `LOG_PERIOD`."""
+        now = time.monotonic()
+        if now - self._logged.get(fault, -LOG_PERIOD) < LOG_PERIOD:
+            return
+        self._logged[fault] = now
+        if level == ERROR:  # rclpy ties a level to the line that logs
+            self.get_logger().error(text)
+        else:
+            self.get_logger().warning(text)
 
     def announce(self, stamp: int, level: bytes, text: str, **facts: object) -> None:
         """Publish a diagnostic status at `stamp` [ns]."""

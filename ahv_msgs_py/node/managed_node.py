@@ -54,6 +54,7 @@ class ManagedNode(LifecycleNode):
         self.finished = Future(executor=None)
         self.refusal = ""  # why the node could not be configured
         self.settings: dict[str, Value] = {}
+        self.own_parameters = tuple(parameters)
         self._known = {entry.name: entry for entry in (*parameters, *SHELL_PARAMETERS)}
         try:
             self.settings = declare_parameters(self, self._known)
@@ -110,7 +111,7 @@ class ManagedNode(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make the law; refuse bad parameters in one sentence."""
-        return self._transition(self._configure)
+        return self._transition("configured", self._configure)
 
     def _configure(self) -> None:
         if not self.settings:
@@ -119,7 +120,7 @@ class ManagedNode(LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the topics."""
-        return self._transition(self.activate)
+        return self._transition("active", self.activate)
 
     def activate(self) -> None:
         """Do the work of activation."""
@@ -127,13 +128,13 @@ class ManagedNode(LifecycleNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Close the topics."""
-        return self._transition(self.close)
+        return self._transition("inactive", self.close)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End the node."""
         if not self.finished.done():
             self.finished.set_result("")
-        return self._transition(self.close)
+        return self._transition("shut down", self.close)
 
     def close(self) -> None:
         """Close what was opened."""
@@ -149,8 +150,8 @@ class ManagedNode(LifecycleNode):
         self.close()
         super().destroy_node()
 
-    def _transition(self, work: Callable[[], None]) -> TransitionCallbackReturn:
-        """Do the work of a transition; rclpy would swallow what it raises.
+    def _transition(self, after: str, work: Callable[[], None]) -> TransitionCallbackReturn:
+        """Do the work of a transition, and log it; rclpy would swallow what it raises.
 
         Why it failed is told once: by `bring_up` to its caller, to that of the service by the log.
         """
@@ -163,6 +164,7 @@ class ManagedNode(LifecycleNode):
         except Exception:
             self.refusal = traceback.format_exc()
             return TransitionCallbackReturn.ERROR
+        self.get_logger().info(after)
         return TransitionCallbackReturn.SUCCESS
 
     def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:

@@ -1,0 +1,64 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""What nodes tell of their settings makes the notes of a bag, however they were started."""
+
+import json
+
+import pytest
+
+from ahv_analysis.bag.recorder_node import completed, told_of
+from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_msgs_py.layout import MessageError, text_bytes, text_of
+from ahv_plant.plant_node import static_transforms
+from test.test_replay import ahv  # noqa: F401  the command in this process
+
+
+def test_a_flight_of_nodes_alone_is_replayed_by_what_they_told(
+    tmp_path,
+    domain,
+    monkeypatch,
+    ahv,  # noqa: F811
+    capfd,
+):
+    """As one that was launched, or whose nodes were started by hand."""
+    monkeypatch.setattr("ahv_analysis.flight.one_process.notes", lambda case: "")
+    case = load_case("neuro_adaptive_di", {"duration": 1.0})
+    fly_graph(case, tmp_path / "bag", domain=domain)
+    told = json.loads(ahv("bag", "info", tmp_path / "bag", "--json").stdout)
+    assert told["case"] == "unnamed" and told["planned_s"] == 1.0
+    flown = case.parameters | {"plant": case.parameters["plant"] | {"listeners": 5}}
+    assert told["notes"]["parameters"] == flown
+    assert "numba" in told["notes"]["versions"]
+    result = json.loads(ahv("replay", tmp_path / "bag", "--json").stdout)
+    assert (result["compared"], result["differences"]) == (6 * 101, 0)
+
+
+def test_what_is_noted_is_not_told_again():
+    noted = {"case": "mine", "versions": {}, "parameters": {"plant": {"duration": 2.0}}}
+    told = {"plant": {"duration": 3.0}, "velocity": {"speed": 1800.0}}
+    content = json.loads(completed(json.dumps(noted), told))
+    assert content == noted | {"parameters": told | noted["parameters"]}
+    for text in ("with love", "[1, 2]", "7"):
+        assert completed(text, told) == text
+    assert json.loads(completed("", told))["case"] == "unnamed"
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\0\1\0\0", text_bytes("hm"), text_bytes('{"node": "plant"}'), text_bytes("[]")]
+)
+def test_what_is_no_setting_is_refused(data):
+    with pytest.raises(MessageError):
+        told_of(data)
+
+
+def test_texts_as_bytes():
+    for text in ("", "a", "äöü" * 7):
+        assert text_of(text_bytes(text)) == text_of(text_bytes(text) + b"\0\0\0") == text
+    with pytest.raises(MessageError):
+        text_of(text_bytes("abc")[:-1])
+
+
+def test_frames_that_do_not_move_are_told_once():
+    """REP-103 and REP-105: map is east-north-up, base_link forward-left-up."""
+    links = {one.header.frame_id: one.child_frame_id for one in static_transforms(0)}
+    assert links == {"map": "map_ned", "base_link_frd": "base_link"}
