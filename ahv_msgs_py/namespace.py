@@ -13,13 +13,9 @@ def remappings(namespace: str) -> list[tuple[str, str]]:
 
 
 def ros_arguments(namespace: str) -> list[str]:
-    """Arguments of ROS for the nodes of a vehicle in `namespace`, several of them in a process.
-
-    What they log goes to /rosout, and thereby into the bag; the terminal is the program's.
-    """
+    """Arguments of ROS for the nodes of a vehicle in `namespace`."""
     rules = [("__ns", namespace), *remappings(namespace)]
     return [
         "--ros-args",
-        "--disable-stdout-logs",
         *(word for old, new in rules for word in ("-r", f"{old}:={new}")),
     ]

@@ -71,7 +71,9 @@ def _fly_graph(
     keep_to_this_machine()
     log_where_it_can()
     context = rclpy.Context()
-    rclpy.init(args=ros_arguments(namespace), context=context, domain_id=domain)
+    # the terminal is the program's: no word on what goes as it should
+    quiet = [*ros_arguments(namespace), "--log-level", "warn"]
+    rclpy.init(args=quiet, context=context, domain_id=domain)
     executor = EventsExecutor(context=context)
     nodes: list[BaseNode] = []
     recorder = None

@@ -165,7 +165,7 @@ def _remapping(recording: Recording, names: Sequence[str]) -> list[str]:
             if topic is DIAGNOSTICS or topic in recording.topics:
                 flown = within(recording.namespace, topic.name)
                 rules += ["-r", f"{name}:{flown}:={REPLAYED}{flown}"]
-    return [*ros_arguments(recording.namespace), *rules]
+    return [*ros_arguments(recording.namespace), "--disable-stdout-logs", *rules]
 
 
 @contextmanager
