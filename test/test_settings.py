@@ -2,15 +2,20 @@
 """What nodes tell of their settings makes the notes of a bag, however they were started."""
 
 import json
+from pathlib import Path
 
 import pytest
+import yaml
 
 from ahv_analysis.bag.recorder_node import completed, told_of
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.layout import MessageError, text_bytes, text_of
+from ahv_msgs_py.topics import FLIGHT, LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
 from ahv_plant.plant_node import static_transforms
 from test.test_replay import ahv  # noqa: F401  the command in this process
+
+ROOT = Path(__file__).parent.parent
 
 
 def test_a_flight_of_nodes_alone_is_replayed_by_what_they_told(
@@ -56,6 +61,22 @@ def test_texts_as_bytes():
         assert text_of(text_bytes(text)) == text_of(text_bytes(text) + b"\0\0\0") == text
     with pytest.raises(MessageError):
         text_of(text_bytes("abc")[:-1])
+
+
+def test_the_stock_recorder_is_told_to_keep_every_topic_of_lockstep():
+    """As rosbag2 reads it: rclcpp's names of policies, a profile for every topic."""
+    profiles = yaml.safe_load((ROOT / "config" / "rosbag2" / "lockstep_qos.yaml").read_text())
+    durable = [topic.name for topic in VIEWER_TOPICS if topic.durable]
+    assert set(profiles) == {*durable, FLIGHT.name, *(topic.name for topic in LOOP_TOPICS)}
+    for profile in profiles.values():
+        policies = ("reliability", "durability", "history", "depth")
+        assert tuple(profile) == policies
+        assert [profile[name] for name in policies] == [
+            "reliable",
+            "transient_local",
+            "keep_last",
+            QUEUE_DEPTH,
+        ]
 
 
 def test_frames_that_do_not_move_are_told_once():
