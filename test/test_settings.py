@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from ahv_analysis.bag.recorder_node import completed, told_of
+from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.layout import MessageError, text_bytes, text_of
@@ -83,3 +84,13 @@ def test_frames_that_do_not_move_are_told_once():
     """REP-103 and REP-105: map is east-north-up, base_link forward-left-up."""
     links = {one.header.frame_id: one.child_frame_id for one in static_transforms(0)}
     assert links == {"map": "map_ned", "base_link_frd": "base_link"}
+
+
+def test_an_infinite_duration_is_written_as_rosbag2_does(tmp_path):
+    """RMW_DURATION_INFINITE of rmw/time.h: 9223372036 s and 854775807 ns, 2^63 - 1 ns in all."""
+    BagWriter(tmp_path / "bag").close()
+    text = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())
+    (topic, *_) = text["rosbag2_bagfile_information"]["topics_with_message_count"]
+    (profile,) = topic["topic_metadata"]["offered_qos_profiles"]
+    for name in ("deadline", "lifespan", "liveliness_lease_duration"):
+        assert profile[name] == {"sec": 9223372036, "nsec": 854775807}

@@ -40,7 +40,9 @@ from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import FLIGHT, LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
 
-_FOREVER = QosTime(2147483647, 4294967295)
+_FOREVER = QosTime(
+    9223372036, 854775807
+)  # RMW_DURATION_INFINITE, as rosbag2 writes it
 _QOS = Qos(
     QosHistory.KEEP_LAST,
     QUEUE_DEPTH,
