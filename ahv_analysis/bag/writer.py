@@ -40,9 +40,7 @@ from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import FLIGHT, LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
 
-_FOREVER = QosTime(
-    9223372036, 854775807
-)  # RMW_DURATION_INFINITE, as rosbag2 writes it
+_FOREVER = QosTime(9223372036, 854775807)  # RMW_DURATION_INFINITE, as rosbag2 writes it
 _QOS = Qos(
     QosHistory.KEEP_LAST,
     QUEUE_DEPTH,
