@@ -175,8 +175,6 @@ class PlantNode(BaseNode):
         stamp = self.step * STEP_NS
         self.now = stamp
         self._send_clock.publish(clock_bytes(stamp))
-        if stamp % NANOSECONDS == 0:
-            self._send_flight(stamp, (self.flight.steps, self.step, FLYING))
         if not self.realtime and stamp % NANOSECONDS == 0 and stamp:
             self.report_health(stamp)
         if self.realtime:
@@ -186,6 +184,7 @@ class PlantNode(BaseNode):
         if self.step % VIEWER_PERIOD == 0:  # while the controllers are at work
             self._publish_for_viewers(stamp)
         if stamp % NANOSECONDS == 0:
+            self._send_flight(stamp, (self.flight.steps, self.step, FLYING))
             self._check_listeners()
 
     # Lockstep

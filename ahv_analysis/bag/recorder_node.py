@@ -17,12 +17,12 @@ from ahv_msgs_py.graph import case_nodes
 from ahv_msgs_py.layout import MessageError, text_of
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
-from ahv_msgs_py.node.guard import Guard, Refusal
+from ahv_msgs_py.node.guard import Guard, Refusal, participant
 from ahv_msgs_py.node.health import ERROR, OK, WARN
 from ahv_msgs_py.node.messages import general_reader, message_class
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.quality import quality
-from ahv_msgs_py.node.subscription import Subscription, gids
+from ahv_msgs_py.node.subscription import Subscription
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import (
     FLIGHT,
@@ -30,6 +30,7 @@ from ahv_msgs_py.topics import (
     LOOP_TOPICS,
     NOMINAL_TOPICS,
     SETTINGS,
+    STATE,
     VIEWER_TOPICS,
     LoopTopic,
     relative,
@@ -108,7 +109,7 @@ class RecorderNode(BaseNode):
             general_reader(FLIGHT.layout),
             time.monotonic_ns,
             realtime=False,
-            publishers=partial(gids, self, self.full_name(FLIGHT)),
+            publishers=list,
         )
         topics = [(topic.name, topic.layout.type_name, durable) for topic in LOOP_TOPICS]
         topics.append((FLIGHT.name, FLIGHT.layout.type_name, True))
@@ -182,6 +183,12 @@ class RecorderNode(BaseNode):
 
     def _read_flight(self, data: bytes, publisher: bytes) -> None:
         """Learn from the plant that the flight is over, and after how many steps."""
+        plants = {participant(gid) for topic, gid in self._filed if topic == STATE.name}
+        if participant(publisher) not in plants:
+            if plants:
+                text = f"{self.full_name(FLIGHT)}: not by the plant"
+                self.fault(self._bag.now, Fault.SECOND_PUBLISHER, text)
+            return
         try:
             _, (_, steps, end) = self._end_guard.read(data, publisher, None)
         except Refusal as refusal:

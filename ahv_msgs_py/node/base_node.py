@@ -16,7 +16,7 @@ from rclpy.qos import QoSProfile
 
 from ahv_msgs_py.layout import NANOSECONDS, text_bytes
 from ahv_msgs_py.node.faults import Fault
-from ahv_msgs_py.node.guard import Guard, Refusal
+from ahv_msgs_py.node.guard import Guard, Refusal, participant
 from ahv_msgs_py.node.health import ERROR, OK, WARN, Health
 from ahv_msgs_py.node.managed_node import ManagedNode
 from ahv_msgs_py.node.messages import diagnostics, general_reader, message_class
@@ -145,14 +145,17 @@ class BaseNode(ManagedNode):
         """Subscribe to a loop topic; `handle(stamp, values)` gets every message that is obeyed."""
         message_type = message_class(topic.layout.type_name)
         name = self.full_name(topic)
-        publishers = partial(gids, self, name)
-        hurry = self.realtime and topic is not FLIGHT  # of which there is one message a second
+        of_plant = topic is FLIGHT  # one message a second, by whoever sends the states
+        publishers = list if of_plant else partial(gids, self, name)
+        hurry = self.realtime and not of_plant
         guard = Guard(topic, general_reader(topic.layout), time.monotonic_ns, hurry, publishers)
         self.heard[topic] = guard
         judge = guard.read
         paces = topic is STATE
 
         def read(data: bytes, publisher: bytes) -> None:
+            if of_plant and not self._is_plant(publisher):
+                return
             try:
                 stamp, values = judge(data, publisher, None if paces else self.now)
             except Refusal as refusal:
@@ -167,6 +170,17 @@ class BaseNode(ManagedNode):
         self._opened.append(listener.close)
         if paces and self.realtime:
             self.receive(FLIGHT, self._flight_told)
+
+    def _is_plant(self, publisher: bytes) -> bool:
+        """Whether who tells of the flight is who sends its states; before the first nobody is."""
+        plant = self.heard[STATE].voice
+        if plant is None:
+            return False
+        known = participant(plant) == participant(publisher)
+        if not known:
+            text = f"{self.full_name(FLIGHT)}: not by the plant"
+            self.fault(self.now or 0, Fault.SECOND_PUBLISHER, text)
+        return known
 
     def _flight_told(self, stamp: int, values: Values) -> None:
         """Learn that the flight is over: from then on no state is missed."""

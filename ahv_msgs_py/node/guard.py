@@ -38,6 +38,11 @@ def refusal(topic: LoopTopic, stamp: int, values: Values) -> Refusal | None:
     return None
 
 
+def participant(gid: bytes) -> bytes:
+    """What all publishers of one process have in common: the start of their GIDs."""
+    return gid[:12]
+
+
 class Guard:
     """Judges the messages of a topic; lets through one voice, in order, with values that can be.
 
@@ -67,7 +72,7 @@ class Guard:
         self._clock = clock
         self._realtime = realtime
         self._publishers = publishers
-        self._voice: bytes | None = None  # GID of the publisher that is obeyed
+        self.voice: bytes | None = None  # GID of the publisher that is obeyed
         self._stamp = -1  # [ns] of the last message that was accepted
         self._heard = 0  # [ns] when that was
 
@@ -79,12 +84,12 @@ class Guard:
         stamp, values = self._judge(data)
         if self._realtime and now is not None:
             self._check_age(stamp, now)
-        if publisher != self._voice:
+        if publisher != self.voice:
             self._check_takeover()
         elif stamp <= self._stamp:
             known = f"stamp {stamp / 1e9:g} s after {self._stamp / 1e9:g} s"
             raise Refusal(Fault.DUPLICATE if stamp == self._stamp else Fault.OUT_OF_ORDER, known)
-        self._voice, self._stamp = publisher, stamp
+        self.voice, self._stamp = publisher, stamp
         if self._realtime:
             self._heard = self._clock()
         return stamp, values
@@ -115,12 +120,12 @@ class Guard:
 
     def _check_takeover(self) -> None:
         """Refuse a message of another publisher while the one that is obeyed is there."""
-        if self._voice is None:
+        if self.voice is None:
             return
         if self._realtime:
             gone = self._clock() - self._heard > SILENCE
         else:
-            gone = self._voice not in self._publishers()
+            gone = self.voice not in self._publishers()
         if not gone:
             raise Refusal(Fault.SECOND_PUBLISHER, "not by the publisher that is obeyed")
 
