@@ -6,8 +6,10 @@ from contextlib import suppress
 from math import isfinite
 from typing import NamedTuple
 
+BASE = "base"  # a case of the package, of which a file says what differs
 # What a case file may set for all nodes by `/**`; a node that has no use for one ignores it.
 SHARED = (
+    BASE,
     "geometric_altitude",
     "lambda",
     *(f"{gain}_{rate}" for gain in ("k", "k_s", "k_ap") for rate in "PQR"),

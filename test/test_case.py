@@ -101,3 +101,22 @@ def test_a_number_may_be_written_as_people_do(tmp_path):
 def test_an_unknown_case_lists_the_known_ones():
     with pytest.raises(ParameterError, match=r"'nope'.*nominal_di"):
         load_case("nope")
+
+
+def test_what_a_file_says_goes_before_what_its_base_says(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "/**/velocity:\n  ros__parameters:\n    k_u: 0.2\n"
+        "/**:\n  ros__parameters:\n    base: neuro_adaptive_di_protected\n    k_P: 3.0\n"
+    )
+    mine, base = load_case(str(file)).parameters, load_case("neuro_adaptive_di_protected")
+    assert mine["velocity"]["k_u"] == 0.2
+    assert mine["inner_loop"]["k_P"] == mine["disturbance_learner"]["k_P"] == 3.0
+    assert mine["outer_intermediate"] == base.parameters["outer_intermediate"]
+
+
+def test_a_base_that_is_none_is_named(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("/**:\n  ros__parameters:\n    base: nominal\n")
+    with pytest.raises(ParameterError, match=r"base: there is no case 'nominal'; valid are .*di"):
+        load_case(str(file))

@@ -14,7 +14,8 @@ from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.experimental import EventsExecutor
 
-from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.case import case_names, load_case
+from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import SENDER_DEPTH
@@ -227,3 +228,18 @@ def test_a_change_in_flight_is_in_force_from_a_step_on_and_announced(graph):
     put("state", 80_000_000, ())
     assert said == [(70_000_000, "parameters changed", {"altitude": 25000.0, "k_h": 0.02})]
     assert (node._outer.altitude, node._outer.k_h) == (25000.0, 0.02)
+
+
+@pytest.mark.parametrize("name", case_names())
+def test_a_node_takes_from_a_case_file_what_ahv_fly_takes(name, domain):
+    """Also where the file names a base and says only what differs."""
+    file = config_folder() / "cases" / f"{name}.yaml"
+    context = rclpy.Context()
+    rclpy.init(args=["--ros-args", "--params-file", str(file)], context=context, domain_id=domain)
+    case = load_case(name)
+    for node in ("plant", *case.controllers):
+        made = NODES[node].node_class(context=context)
+        settings = {known: made.settings[known] for known in case.parameters[node]}
+        made.destroy_node()
+        assert settings == case.parameters[node], node
+    rclpy.shutdown(context=context)

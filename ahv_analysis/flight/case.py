@@ -18,15 +18,12 @@ from ahv_control.parameters import (
     outer_loop,
     velocity_loop,
 )
-from ahv_msgs_py.config import config_folder
+from ahv_msgs_py.case_file import case_names, case_path, read_case_file
 from ahv_msgs_py.graph import NODES, case_nodes, controllers
-from ahv_msgs_py.parameter_file import read_parameter_file
-from ahv_msgs_py.parameters import SHARED, ParameterError, Value, check_parameters
+from ahv_msgs_py.parameters import ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
 from ahv_plant.parameters import PlantSettings, plant_settings
-
-EVERY_NODE = "/**"
 
 
 class Draw(NamedTuple):
@@ -61,11 +58,6 @@ def notes(case: Case) -> str:
     return json.dumps(content)
 
 
-def case_names() -> list[str]:
-    """Cases that come with the package."""
-    return sorted(path.stem for path in (config_folder() / "cases").glob("*.yaml"))
-
-
 def load_case(
     name: str,
     plant: Mapping[str, object] | None = None,
@@ -78,13 +70,13 @@ def load_case(
     where the dispersion comes from, if it was drawn. The file is read as nodes in `namespace` do.
     """
     path = Path(name)
-    if path.suffix not in (".yaml", ".yml"):
-        path = config_folder() / "cases" / f"{name}.yaml"
-    if not path.is_file():
+    if path.suffix not in (".yaml", ".yml") and name in case_names():
+        path = case_path(name)
+    elif not path.is_file():
         raise ParameterError(
             f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
         )
-    given = _read(path, namespace)
+    given = read_case_file(path, namespace)
     given["plant"] |= plant or {}
     return make_case(path.stem, given, draw)
 
@@ -96,7 +88,7 @@ def dispersion_parameters(dispersion: Dispersion) -> dict[str, object]:
 
 def load_dispersion(path: Path, namespace: str = NAMESPACE) -> dict[str, object]:
     """Plant parameters of a dispersion file: a ROS parameter file with the plant alone."""
-    given = _read(path, namespace)
+    given = read_case_file(path, namespace)
     for node, values in given.items():
         for name in values:
             if node != "plant" or not name.startswith(("dispersion.", "disturbance.")):
@@ -124,43 +116,3 @@ def make_case(
         learner_settings(parameters["disturbance_learner"]) if adaptive else None,
     )
     return Case(name, parameters, plant_settings(parameters["plant"]), control, draw)
-
-
-def _read(path: Path, namespace: str) -> dict[str, dict[str, object]]:
-    """Parameters per node as the file gives them, those of `/**` given to all that know them."""
-    sections = read_parameter_file(path)
-    # of one node in any namespace, or in its own, as ROS has it
-    places = {
-        f"{where.rstrip('/')}/{node}": node
-        for where in (EVERY_NODE, namespace)
-        for node in case_nodes()
-    }
-    valid = [EVERY_NODE, *places]
-    if not sections:
-        raise ParameterError(f"{path.name}: must have sections {', '.join(valid)}")
-    for section in sections:
-        if section not in valid:
-            raise ParameterError(
-                f"{path.name}: there is no node {section!r}; valid are {', '.join(valid)}"
-            )
-    shared = sections.get(EVERY_NODE, {})
-    for name in shared:
-        if name not in SHARED:
-            raise ParameterError(
-                f"{path.name}: {EVERY_NODE}: {name!r} is not one of {', '.join(SHARED)}"
-            )
-    own: dict[str, dict[str, object]] = {node: {} for node in case_nodes()}
-    for section, node in places.items():
-        body = sections.get(section, {})
-        twice = sorted((shared.keys() | own[node].keys()) & body.keys())
-        if twice:
-            other = EVERY_NODE if twice[0] in shared else f"{EVERY_NODE}/{node}"
-            raise ParameterError(
-                f"{path.name}: {twice[0]} stands in {other} and in {section}; once is enough"
-            )
-        own[node] |= body
-    return {
-        node: {name: shared[name] for name in shared if name in known} | own[node]
-        for node in case_nodes()
-        for known in [{parameter.name for parameter in NODES[node].parameters}]
-    }

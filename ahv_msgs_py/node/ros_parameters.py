@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from ahv_msgs_py.parameters import SHARED, Parameter, ParameterError, Value, check_parameters
+from ahv_msgs_py.case_file import with_base
+from ahv_msgs_py.parameters import BASE, SHARED, Parameter, ParameterError, Value, check_parameters
 
 SIMULATED_TIME = "use_sim_time"  # what ROS gives to every node
 
@@ -23,12 +24,13 @@ def check_time(name: str, value: object) -> None:
 def declare_parameters(node: Node, known: Mapping[str, Parameter]) -> dict[str, Value]:
     """Check what `node` was given, then declare all it knows; ParameterError if it is wrong."""
     check_time(node.get_name(), node.get_parameter(SIMULATED_TIME).value)
-    ignored = {SIMULATED_TIME, "start_type_description_service", *SHARED} - {*known}
+    ignored = {SIMULATED_TIME, "start_type_description_service", *SHARED} - {*known, BASE}
     given = {
         key: parameter.value
         for key, parameter in node.get_parameters_by_prefix("").items()
         if key not in ignored and not key.startswith("qos_overrides.")
     }
+    given = with_base(node.get_name(), given)
     values = check_parameters(node.get_name(), known.values(), given)
     for parameter in known.values():
         if node.has_parameter(parameter.name):
