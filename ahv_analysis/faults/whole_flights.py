@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from ahv_analysis.flight.watcher import Watcher
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES
+from ahv_plant.model.constants import STEP
 
 CASE = "neuro_adaptive_sc_gdi"
 DURATION = 6.0  # [s] of each flight
@@ -123,7 +124,7 @@ def fly_with(fault: Fault, folder: Path, watcher: Watcher) -> End:
         try:
             while program.poll() is None and time.monotonic() < deadline:
                 watcher.look(LOOK)
-                if watcher.step == 0 and not began:
+                if 0 <= watcher.step * STEP < LEAD and not began:  # not of the flight before
                     began = time.monotonic()
                 if began and not acted and time.monotonic() - began > LEAD:
                     fault.act(folder)
