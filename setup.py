@@ -48,7 +48,7 @@ setup(
         "setuptools",
         "numpy",  # arrays of flights
         "scipy",  # intervals of success rates, rotations
-        "numba>=0.60",  # the vehicle and the laws at machine speed
+        "numba>=0.60,<0.69",  # the vehicle and the laws at machine speed
         "mcap",  # records of MCAP files; brings zstandard and lz4, which compress their chunks
         "rosbags>=0.11",  # message definitions and quality of service, without a ROS installation
         "matplotlib",  # figures
@@ -61,7 +61,7 @@ setup(
     ],
     extras_require={
         # ROS itself where there is no ROS installation; a ROS machine brings its own
-        "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
+        "ros": ["ros-jazzy-rclpy[fastrtps]>=7.1,<7.2", "ros-jazzy-common-interfaces"],
         # campaigns on a dask.distributed cluster
         "dask": ["distributed"],
         "test": [

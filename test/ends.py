@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import rclpy
-from rclpy.experimental import EventsExecutor
 
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.topics import LOOP_TOPICS, VIEWER_TOPICS
 
 LONGEST_FLIGHT = 120.0  # [s] with its start, on a machine that has much else to do

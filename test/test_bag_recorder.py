@@ -13,7 +13,6 @@ import rclpy
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
-from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.bag.reader import read_bag
 from ahv_analysis.bag.record import record
@@ -26,6 +25,7 @@ from ahv_analysis.flight.library import fly, fly_library
 from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, STATE
 from test.bags import mcap_of

@@ -2,6 +2,7 @@
 """Whatever is imported is declared: to pip in setup.py, to rosdep in package.xml."""
 
 import ast
+import inspect
 import re
 import subprocess
 import sys
@@ -147,8 +148,51 @@ def test_packages_import_in_one_direction(package):
 
 SHELLS = [
     f"ahv_msgs_py/node/{name}.py"
-    for name in ("messages", "process", "quality", "ros_parameters", "subscription")
+    for name in (
+        "messages",
+        "process",
+        "quality",
+        "rclpy_internals",
+        "ros_parameters",
+        "subscription",
+    )
 ]
+
+
+# What a library does not promise to keep, and the only files that may use it.
+FENCED = {
+    r"rclpy\._|rclpy\.impl|rclpy\.experimental|_service_change_state": {
+        "ahv_msgs_py/node/rclpy_internals.py"
+    },
+    r"numba\.core|llvmlite import ir": {
+        "ahv_plant/numerics/cache.py",
+        "ahv_plant/numerics/elementwise.py",
+        "ahv_plant/numerics/compiling.py",
+        "ahv_plant/numerics/simd.py",
+    },
+}
+
+
+@pytest.mark.parametrize("what", FENCED)
+def test_internals_of_libraries_are_used_in_one_place(what):
+    files = [path for folder in OURS - {"test"} for path in sources(folder)]
+    users = {str(path.relative_to(ROOT)) for path in files if re.search(what, path.read_text())}
+    assert users == FENCED[what]
+
+
+def test_rclpy_still_has_what_is_used_of_its_internals():
+    from rclpy.impl.implementation_singleton import rclpy_implementation
+    from rclpy.lifecycle import LifecycleNode
+
+    missing = [
+        name
+        for name in ("RCLError", "RMWError", "Subscription")
+        if not hasattr(rclpy_implementation, name)
+    ]
+    source = inspect.getsource(LifecycleNode.__mro__[1])
+    if "_service_change_state" not in source:
+        missing.append("LifecycleNode._service_change_state")
+    assert not missing, f"rclpy lacks {', '.join(missing)}"
 
 
 def test_laws_know_nothing_of_ros():

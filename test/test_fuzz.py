@@ -7,13 +7,13 @@ import pytest
 import rclpy
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.flight.case import load_case
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.layout import NamedVector
 from ahv_msgs_py.node.faults import PERIOD, Fault
 from ahv_msgs_py.node.messages import message_class
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,

@@ -12,13 +12,13 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.flight.case import case_names, load_case
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import SENDER_DEPTH
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, DIAGNOSTICS, LOOP_TOPICS, ODOMETRY, STATE
 

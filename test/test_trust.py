@@ -7,7 +7,6 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.experimental import EventsExecutor
 
 from ahv_analysis.bag.reader import load_bag
 from ahv_analysis.bag.recorder_node import RecorderNode
@@ -17,6 +16,7 @@ from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.node.subscription import Listener, gids
 from ahv_msgs_py.topics import (
     DIAGNOSTICS,

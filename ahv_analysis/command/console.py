@@ -5,11 +5,9 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Lock
 from typing import Annotated, Any
 
 import typer
-from numba.core.event import Listener, install_listener
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -22,6 +20,8 @@ from rich.progress import (
 )
 from rich.table import Table
 from rich.text import Text
+
+from ahv_plant.numerics.compiling import told_of_compiling
 
 
 class Terminal(Console):
@@ -111,28 +111,6 @@ class Reported:
         self._progress(done)
 
 
-class _Compiling(Listener):
-    """Says when laws are compiled, which the first flight after a change waits for."""
-
-    def __init__(self, say: Callable[[str], None]):
-        self._say = say
-        self._lock = Lock()  # threads compile too
-        self._depth = 0  # a law's functions are compiled while it is
-
-    def _change(self, by: int) -> None:
-        with self._lock:
-            self._depth += by
-            self._say(": compiling, once" if self._depth else "")
-
-    def on_start(self, event: object) -> None:
-        """Something is compiled, and was not in the cache."""
-        self._change(1)
-
-    def on_end(self, event: object) -> None:
-        """It is."""
-        self._change(-1)
-
-
 @contextmanager
 def progress_bar(
     title: str, total: int, hidden: bool, unit: str = "steps"
@@ -147,8 +125,11 @@ def progress_bar(
     )
     with Progress(*columns, console=Terminal(stderr=True), disable=hidden, transient=True) as bar:
         task = bar.add_task(title, total=total)
-        compiling = _Compiling(lambda note: bar.update(task, description=title + note))
-        with install_listener("numba:compile", compiling):
+
+        def tell(compiling: bool) -> None:
+            bar.update(task, description=title + (": compiling, once" if compiling else ""))
+
+        with told_of_compiling(tell):
             yield lambda done: bar.update(task, completed=done)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
-from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
 from ahv_analysis.bag.recorder_node import STOP, RecorderNode
@@ -20,6 +19,7 @@ from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.network import keep_to_this_machine
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.experimental import EventsExecutor
 
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE
 from ahv_plant.model.constants import STEP_NS
 

@@ -7,7 +7,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
@@ -15,6 +14,7 @@ from ahv_analysis.bag.notes import Notes
 from ahv_analysis.bag.reader import read
 from ahv_analysis.bag.series import Series
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
+from ahv_msgs_py.node.rclpy_internals import RMWError
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import DIAGNOSTICS, LoopTopic
 from ahv_plant.model.constants import STEP_NS
@@ -57,7 +57,7 @@ def read_recording(path: Path) -> Recording:
 def _deserialized(data: bytes, message_type: type) -> Any:
     try:
         return deserialize_message(data, message_type)
-    except rclpy._rclpy_pybind11.RMWError as error:
+    except RMWError as error:
         raise MessageError("the bytes are no message of the topic's type") from error
 
 

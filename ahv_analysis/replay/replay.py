@@ -23,7 +23,6 @@ import numpy as np
 import rclpy
 from numpy.typing import NDArray
 from rclpy.executors import Executor
-from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
@@ -44,6 +43,7 @@ from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.network import DISCOVERY_RANGE, keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import (

@@ -14,6 +14,7 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 from rclpy.timer import Timer
 
+from ahv_msgs_py.node.rclpy_internals import RCLError, change_state_service
 from ahv_msgs_py.node.ros_parameters import SIMULATED_TIME, check_time, declare_parameters
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import NAMESPACE
@@ -65,9 +66,8 @@ class ManagedNode(LifecycleNode):
         self._changed: dict[str, Value] = {}  # in flight, not yet in force
         self.add_on_set_parameters_callback(self._change)
         # an impossible transition is answered with a refusal; rclpy would end the process
-        self._service_change_state.callback = partial(
-            self._change_state, self._service_change_state.callback
-        )
+        service = change_state_service(self)
+        service.callback = partial(self._change_state, service.callback)
 
     def create_timer(self, period: float, callback: Callable[[], None], **options: Any) -> Timer:
         """Create a timer by the steady clock: whoever sets the system's clock moves no step."""
@@ -173,7 +173,7 @@ class ManagedNode(LifecycleNode):
             if not answer.success and self.refusal:
                 self.get_logger().error(self.refusal)
             return answer
-        except rclpy._rclpy_pybind11.RCLError as error:
+        except RCLError as error:
             self.get_logger().warning(f"impossible transition: {str(error).splitlines()[0]}")
             response.success = False
             return response

@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import deserialize_message
 
 from ahv_msgs_py.layout import NANOSECONDS, Layout, MessageError
+from ahv_msgs_py.node.rclpy_internals import RMWError
 
 
 def message_class(type_name: str) -> Any:
@@ -28,7 +28,7 @@ def general_reader(layout: Layout) -> Callable[[bytes], tuple[int, tuple[float, 
     def read(data: bytes) -> tuple[int, tuple[float, ...]]:
         try:
             message = deserialize_message(data, message_type)
-        except rclpy._rclpy_pybind11.RMWError as error:
+        except RMWError as error:
             raise MessageError("the bytes are no message of the topic's type") from error
         return layout.values_of(message)
 

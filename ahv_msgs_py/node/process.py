@@ -9,7 +9,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import rclpy
-from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
@@ -18,6 +17,7 @@ from ahv_msgs_py.node.deadline import end_within
 from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.managed_node import AUTOSTART
 from ahv_msgs_py.node.network import keep_to_this_machine
+from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameter_file import read_parameter_file
 from ahv_msgs_py.parameters import ParameterError

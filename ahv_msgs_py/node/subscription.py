@@ -10,11 +10,12 @@ import ctypes
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.type_support import check_is_valid_msg_type
 from rclpy.waitable import NumberOfEntities, Waitable
+
+from ahv_msgs_py.node.rclpy_internals import SubscriptionHandle
 
 GID_SIZE = 16  # [bytes] RMW_GID_STORAGE_SIZE
 Taken = tuple[bytes, bytes, int]  # a message as CDR, GID of its publisher, its number there
@@ -69,7 +70,7 @@ class Subscription:
         """Subscribe to a topic; until `close`."""
         check_is_valid_msg_type(message_type)  # type: ignore[no-untyped-call]  # and loads it
         with node.handle:
-            self.handle: Any = rclpy_implementation.Subscription(
+            self.handle: Any = SubscriptionHandle(
                 node.handle,
                 message_type,
                 name,
