@@ -14,7 +14,7 @@ from ahv_control.law import Commands
 from ahv_plant.dispersion import Truth
 from ahv_plant.model.constants import STEP
 from ahv_plant.model.vectors import State
-from ahv_plant.numerics.elementwise import elementwise
+from ahv_plant.numerics.elementwise import composition, elementwise
 from ahv_plant.vehicle import vehicle_step
 
 
@@ -33,7 +33,7 @@ def start_loop(state: State, control: FlightControl) -> Loop:
     return Loop(state, memory, commands)
 
 
-@elementwise
+@composition
 def loop_step(loop: Loop, number: int, truth: Truth, control: FlightControl) -> Loop:
     """Loop one step later; `number` counts the steps flown before."""
     held = loop.commands
