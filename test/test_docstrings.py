@@ -22,7 +22,7 @@ SOURCES = {
     if not path.name.endswith(("_node.py", "__init__.py"))
 }
 # Tools, and what crosses a topic: no equation of the report stands behind them.
-_NUMERICS = ("elementwise", "simd", "elementary", "optional", "identity", "cache")
+_NUMERICS = ("compiling", "elementwise", "simd", "elementary", "optional", "identity", "cache")
 OWN = {f"ahv_plant.numerics.{name}" for name in _NUMERICS}
 OWN |= {
     "ahv_plant.model.vectors",
