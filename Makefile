@@ -12,7 +12,7 @@ PYTHON ?= $(shell for python in python3 python3.12 python3.11; do \
 OUT ?= flights/nominal_di-$(shell date +%Y%m%d-%H%M%S)
 BIN := .venv/bin
 READY := .venv/ready
-MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis launch docs examples test setup.py
+MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis launch docs examples studies test setup.py
 TEXTS := $(wildcard *.md *.rst *.cff docs/*.md) config Makefile package.xml
 
 .PHONY: fly docs test test-docs test-slow bench venv clean

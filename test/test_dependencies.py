@@ -14,7 +14,8 @@ from catkin_pkg.package import parse_package
 from test.test_packaging import setup  # noqa: F401  what setup.py hands to setuptools
 
 ROOT = Path(__file__).parent.parent
-OURS = {"ahv_plant", "ahv_control", "ahv_msgs_py", "ahv_analysis", "test"}
+INSTALLED = {"ahv_plant", "ahv_control", "ahv_msgs_py", "ahv_analysis"}
+OURS = INSTALLED | {"studies", "test"}
 # By import: the name in setup.py and the key of rosdep; None where rosdep knows none.
 PYTHON = {
     "PIL": ("matplotlib", "python3-matplotlib"),  # which draws with it
@@ -85,17 +86,16 @@ def sources(folder):
     return found
 
 
-RUNNING = (
-    imports(path for folder in (*OURS - {"test"}, "launch") for path in sources(folder)) - OURS
-)
-TESTING = imports(sources("test")) - OURS
+RUNNING = imports(path for folder in (*INSTALLED, "launch") for path in sources(folder)) - OURS
+TESTING = imports([*sources("studies"), *sources("test")]) - OURS
 
 
 MAY_IMPORT = {  # as docs/architecture.md says
     "ahv_msgs_py": {"ahv_msgs_py"},
     "ahv_plant": {"ahv_plant", "ahv_msgs_py"},
     "ahv_control": {"ahv_control", "ahv_plant", "ahv_msgs_py"},
-    "ahv_analysis": OURS - {"test"},
+    "ahv_analysis": INSTALLED,
+    "studies": INSTALLED | {"studies"},
 }
 
 
@@ -175,7 +175,7 @@ FENCED = {
 
 @pytest.mark.parametrize("what", FENCED)
 def test_internals_of_libraries_are_used_in_one_place(what):
-    files = [path for folder in OURS - {"test"} for path in sources(folder)]
+    files = [path for folder in INSTALLED for path in sources(folder)]
     users = {str(path.relative_to(ROOT)) for path in files if re.search(what, path.read_text())}
     assert users == FENCED[what]
 

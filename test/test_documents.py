@@ -120,7 +120,7 @@ def test_links_lead_somewhere(page):
 @by_name
 def test_files_that_are_named_exist(page):
     for span in spans(page):
-        if re.fullmatch(r"(ahv_\w+|config|docs|examples|launch|test)/[\w./-]+", span):
+        if re.fullmatch(r"(ahv_\w+|config|docs|examples|launch|studies|test)/[\w./-]+", span):
             assert (ROOT / span).exists(), span
 
 

@@ -29,7 +29,7 @@ def test_the_citation_is_of_this_version(setup):  # noqa: F811
 
 def test_every_source_file_says_whose_it_is():
     """REP-2004 asks for a statement in each, even of a package that is an experiment."""
-    folders = ("ahv_*", "docs", "examples", "launch", "resource", "test")
+    folders = ("ahv_*", "docs", "examples", "launch", "resource", "studies", "test")
     kinds = ("*.py", "*.cpp", "CMakeLists.txt", "nodes/*")
     for path in (path for f in folders for kind in kinds for path in ROOT.glob(f"{f}/**/{kind}")):
         beginning = path.read_text().splitlines()[:2]

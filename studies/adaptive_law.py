@@ -1,5 +1,5 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""The studies behind the adaptive law: `python -m ahv_analysis.studies.adaptive_law`.
+"""The studies behind the adaptive law: `python -m studies.adaptive_law`.
 
 Flights of the section 4.3 start, and of one disturbed in all axes, on drawn vehicles; what is
 counted is the barrier's doing, the loss of vehicles, and how well rates follow the desired plant.

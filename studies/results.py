@@ -1,5 +1,5 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""The studies behind docs/results.md: `python -m ahv_analysis.studies.results`.
+"""The studies behind docs/results.md: `python -m studies.results`.
 
 What the cautious start of a protected flight is worth, which vehicles full elevons do not save,
 and what other readings of the report's chapter 5 give.
@@ -17,7 +17,6 @@ from ahv_analysis.campaign.summary import exact_interval
 from ahv_analysis.campaign.table import CONTROLLERS, REPORT
 from ahv_analysis.flight.case import Case, load_case, make_case
 from ahv_analysis.flight.library import fly
-from ahv_analysis.studies.adaptive_law import row
 from ahv_control.flight_control import start as start_law
 from ahv_plant.dispersion import Dispersion, Truth
 from ahv_plant.model.constants import (
@@ -31,6 +30,7 @@ from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.numerics.elementary import atan
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.vehicle import vehicle_step
+from studies.adaptive_law import row
 
 SEED = 2017
 LEVEL, RUNS = 0.5, 3873  # of the protection; as many as the report flew at 40 %
