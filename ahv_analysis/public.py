@@ -4,7 +4,6 @@
 Nothing here needs ROS: the library flies, to the bits of the graph.
 """
 
-import json
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +18,7 @@ import xarray
 from pyarrow.parquet import read_table
 
 from ahv_analysis.bag.dataset import bag_dataset, flight_dataset
+from ahv_analysis.bag.notes import NOTES, read_notes
 from ahv_analysis.bag.record import FlightRecord, record
 from ahv_analysis.campaign import campaign as campaigns
 from ahv_analysis.campaign.store import level_folder, part_files
@@ -50,7 +50,7 @@ class Flight:
 
     def dataset(self) -> xarray.Dataset:
         """Every signal over `time` [s], with units, frame and meaning as attributes."""
-        return flight_dataset(self.record, json.loads(notes(self.case)))
+        return flight_dataset(self.record, read_notes({NOTES: notes(self.case)}))
 
     def summary(self) -> dict[str, Any]:
         """Verdict, extremes and end, as `ahv fly --json` prints them."""

@@ -25,7 +25,6 @@ LARGEST = 2**22  # [bytes] of metadata as text
 LONGEST_NAME = 255  # [bytes] of a file
 MOST_NODES, DEEPEST = 200_000, 30  # of YAML: more than a thousand topics and files have
 _TEXT = "serialized_metadata"
-NOTES = "ahv"  # key of the notes of a flight in the custom data
 QOS_KEY, HASH_KEY = "offered_qos_profiles", "topic_type_hash"  # of a channel's metadata
 
 

@@ -28,7 +28,6 @@ from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag.mcap_file import Index, McapFile
 from ahv_analysis.bag.metadata import (
-    NOTES,
     BagFile,
     Topic,
     bag_metadata,
@@ -36,6 +35,7 @@ from ahv_analysis.bag.metadata import (
     qos_text,
     write_metadata,
 )
+from ahv_analysis.bag.notes import NOTES
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import FLIGHT, LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS

@@ -26,13 +26,13 @@ class Panel(NamedTuple):
     unit: str  # of SCALES; empty: the one that people are shown elsewhere
 
     def values(self, record: FlightRecord) -> Array:
-        """Values (N+1,) in the unit of the panel."""
+        """What is drawn, (N+1,), in the unit of the panel."""
         values = self.quantity.drawn(record, self.unit)
         assert values is not None, self.quantity.name
         return values
 
     def command(self, record: FlightRecord) -> Array | None:
-        """Recorded command (N+1,) in the unit of the panel."""
+        """What was commanded, (N+1,), in the unit of the panel; None if nothing was."""
         return self.quantity.drawn_reference(record, None, self.unit)
 
     @property
