@@ -4,7 +4,7 @@
 import rclpy
 
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
-from ahv_control.flight_control import NEUTRAL, first_learner, next_learner
+from ahv_control.flight_control import first_learner, next_learner
 from ahv_control.held_inputs import held_rates, held_surfaces, nothing
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.parameters import LEARNER_PARAMETERS, learner_settings
@@ -22,7 +22,6 @@ from ahv_msgs_py.topics import (
 )
 from ahv_plant.model.constants import DEGREES, STEP_NS
 from ahv_plant.model.vectors import Rates, State, Surfaces
-from ahv_plant.start import DEFAULT_START
 
 
 class DisturbanceLearnerNode(BaseNode):
@@ -33,6 +32,8 @@ class DisturbanceLearnerNode(BaseNode):
     observer starts anew at the new one, and the weights stay.
     """
 
+    laws = (first_learner, next_learner, disturbance_estimate)
+
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
     ):
@@ -42,11 +43,6 @@ class DisturbanceLearnerNode(BaseNode):
     def prepare(self, settings: dict[str, Value]) -> None:
         """Make the law."""
         self._law = learner_settings(settings)
-        still, start = Rates(0.0, 0.0, 0.0), DEFAULT_START  # compiled before it flies
-        learner = next_learner(
-            first_learner(start, self._law), start, NEUTRAL, still, start, self._law
-        )
-        disturbance_estimate(learner, still)
 
     def start(self) -> None:
         """Open the topics; nothing is known yet."""

@@ -5,7 +5,7 @@ import rclpy
 
 from ahv_control.flight_control import NEUTRAL
 from ahv_control.held_inputs import held_estimate, held_rates, nothing
-from ahv_control.inner_loop import Learned, adaptive_surfaces, nominal_surfaces
+from ahv_control.inner_loop import adaptive_surfaces, nominal_surfaces
 from ahv_control.learner_message import learned_of, unlearned
 from ahv_control.newton_raphson import Solution, SolverStatus
 from ahv_control.parameters import INNER_LOOP_PARAMETERS, inner_loop
@@ -21,7 +21,6 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
 )
 from ahv_plant.model.vectors import Rates, State
-from ahv_plant.start import DEFAULT_START
 
 FAULTS = {
     SolverStatus.SATURATED: Fault.SURFACES_SATURATED,
@@ -36,6 +35,8 @@ class InnerLoopNode(BaseNode):
     With the parameter `adaptive` it waits for the disturbance learner's messages as well.
     """
 
+    laws = (nominal_surfaces, adaptive_surfaces)
+
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
     ):
@@ -45,12 +46,6 @@ class InnerLoopNode(BaseNode):
     def prepare(self, settings: dict[str, Value]) -> None:
         """Make the loop."""
         self._loop = inner_loop(settings)
-        still = Rates(0.0, 0.0, 0.0)  # compiled before it flies
-        if settings["adaptive"]:
-            learned = Learned(still, still, still)
-            adaptive_surfaces(DEFAULT_START, still, learned, NEUTRAL, self._loop)
-        else:
-            nominal_surfaces(DEFAULT_START, still, NEUTRAL, self._loop)
 
     def start(self) -> None:
         """Open the topics; the first search starts at neutral surfaces."""

@@ -16,11 +16,12 @@ from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND
 from ahv_plant.model.vectors import State
-from ahv_plant.start import DEFAULT_START
 
 
 class OuterIntermediateNode(BaseNode):
     """Answers every state with an attitude and a body-rate command."""
+
+    laws = (attitude_command, rate_command)
 
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
@@ -32,8 +33,6 @@ class OuterIntermediateNode(BaseNode):
         """Make both loops."""
         self._outer = outer_loop(settings)
         self._intermediate = intermediate_loop(settings)
-        attitude = attitude_command(DEFAULT_START, self._outer)  # compiled before it flies
-        rate_command(DEFAULT_START, attitude, self._intermediate)
 
     def start(self) -> None:
         """Open the topics."""

@@ -3,7 +3,6 @@
 
 import rclpy
 
-from ahv_control.flight_control import NEUTRAL
 from ahv_control.held_inputs import held_surfaces
 from ahv_control.parameters import VELOCITY_PARAMETERS, velocity_loop
 from ahv_control.velocity_loop import throttle_command
@@ -15,11 +14,12 @@ from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import SURFACE_COMMAND, THROTTLE_COMMAND
 from ahv_plant.model.constants import THROTTLE_MAXIMUM, THROTTLE_MINIMUM
 from ahv_plant.model.vectors import State, Surfaces
-from ahv_plant.start import DEFAULT_START
 
 
 class VelocityNode(BaseNode):
     """Answers every state and its surface command with a throttle command."""
+
+    laws = (throttle_command,)
 
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
@@ -30,7 +30,6 @@ class VelocityNode(BaseNode):
     def prepare(self, settings: dict[str, Value]) -> None:
         """Make the loop."""
         self._loop = velocity_loop(settings)
-        throttle_command(DEFAULT_START, NEUTRAL, self._loop)  # compiled before it flies
 
     def start(self) -> None:
         """Open the topics."""

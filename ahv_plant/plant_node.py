@@ -47,7 +47,7 @@ from ahv_plant.model.constants import STEP, STEP_NS
 from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
 from ahv_plant.safe_command import SAFE_THROTTLE, safe_surfaces
-from ahv_plant.termination import termination_reason
+from ahv_plant.termination import termination, termination_reason
 from ahv_plant.vehicle import vehicle_step
 from ahv_plant.viewer_pose import (
     FLU_IN_FRD,
@@ -81,6 +81,8 @@ class PlantNode(BaseNode):
     was flown to its end.
     """
 
+    laws = (vehicle_step, termination)
+
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
     ):
@@ -92,9 +94,6 @@ class PlantNode(BaseNode):
         self.flight = plant_settings(settings)
         self.step = 0
         self.state = self.flight.initial
-        truth = self.flight.truth  # compiled before it flies
-        vehicle_step(self.state, Surfaces(0.0, 0.0, 0.0), SAFE_THROTTLE, 0.0, truth)
-        termination_reason(self.state, truth.geometric, 0.0)
 
     def start(self) -> None:
         """Open the topics; the flight starts, or goes on, when as many listen as should."""

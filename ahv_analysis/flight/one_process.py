@@ -11,7 +11,7 @@ from rclpy.task import Future
 from ahv_analysis.bag.recorder_node import STOP, RecorderNode
 from ahv_analysis.errors import GraphError
 from ahv_analysis.flight.case import Case, notes
-from ahv_analysis.flight.library import INTERRUPTED, fly
+from ahv_analysis.flight.library import INTERRUPTED
 from ahv_analysis.interrupt import signals_wait
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.namespace import ros_arguments
@@ -20,6 +20,7 @@ from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
+from ahv_msgs_py.node.warm_up import warm_up_nodes
 from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, NOMINAL_TOPICS, STATE, LoopTopic
 from ahv_plant.plant_node import PlantNode
 
@@ -52,8 +53,7 @@ def fly_graph(
     flight goes on without a record then. A signal ends the flight in order: it has its effect once
     the bag is whole and the graph is gone.
     """
-    for _ in zip(range(2), fly(case), strict=False):
-        pass  # compile the laws before the clock runs
+    warm_up_nodes(("plant", *case.controllers))
     with signals_wait() as interrupted:
         return _fly_graph(case, bag, domain, namespace, realtime, on_error, progress, interrupted)
 

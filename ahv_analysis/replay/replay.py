@@ -30,7 +30,6 @@ from rclpy.task import Future
 from ahv_analysis.bag.series import Series
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import Case
-from ahv_analysis.flight.library import fly
 from ahv_analysis.interrupt import signals_wait
 from ahv_analysis.replay.inputs import LEARNER_NODE, Change, Recording
 from ahv_analysis.replay.result import Comparison, compare
@@ -45,6 +44,7 @@ from ahv_msgs_py.node.network import DISCOVERY_RANGE, keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.node.synchronizer import Values
+from ahv_msgs_py.node.warm_up import warm_up_nodes
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import (
     BY_NAME,
@@ -123,8 +123,7 @@ def replay(
     Raises ParameterError for settings that a node refuses, BagError if the bag lacks a topic that
     a node needs, GraphError if a node stops answering or somebody flies here.
     """
-    for _ in zip(range(2), fly(case), strict=False):
-        pass  # compile the laws before anything must be left in order
+    warm_up_nodes(names)  # before anything must be left in order
     hidden = rate is None
     with (
         signals_wait() as interrupted,

@@ -16,6 +16,7 @@ from rclpy.timer import Timer
 
 from ahv_msgs_py.node.rclpy_internals import RCLError, change_state_service
 from ahv_msgs_py.node.ros_parameters import SIMULATED_TIME, check_time, declare_parameters
+from ahv_msgs_py.node.warm_up import Law, warm_up
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_msgs_py.topics import NAMESPACE
 
@@ -29,8 +30,11 @@ class ManagedNode(LifecycleNode):
 
     A subclass fills in `prepare`, which makes the law from the settings (on configure, and when
     parameters change in flight), and `start`, which opens the topics (on activate; what it opened
-    is closed on deactivate). `finished` is the future that ends the process.
+    is closed on deactivate). Its `laws` are the functions that it calls in a step.
+    `finished` is the future that ends the process.
     """
+
+    laws: Sequence[Law] = ()
 
     def __init__(
         self,
@@ -117,6 +121,7 @@ class ManagedNode(LifecycleNode):
         if not self.settings:
             raise ParameterError(self.refusal)
         self.prepare(self.settings)
+        warm_up(self.laws)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the topics."""

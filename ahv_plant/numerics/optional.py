@@ -6,6 +6,7 @@ is compiled, so that a law without the part costs nothing, and its state is None
 """
 
 from collections.abc import Callable
+from functools import wraps
 from typing import Any, TypeVar
 
 from numba import types
@@ -20,6 +21,7 @@ def optional(function: Callable[..., Result]) -> Callable[..., Result | None]:
     """Element-wise `function` that answers None if its last argument, the settings, is None."""
     compiled = elementwise(function)
 
+    @wraps(function)
     def call(*arguments: Any) -> Result | None:
         return None if arguments[-1] is None else compiled(*arguments)
 
