@@ -190,10 +190,12 @@ class RecorderNode(BaseNode):
                 self.fault(self._bag.now, Fault.SECOND_PUBLISHER, text)
             return
         try:
-            _, (_, steps, end) = self._end_guard.read(data, publisher, None)
+            stamp, (_, steps, end) = self._end_guard.read(data, publisher, None)
         except Refusal as refusal:
             self.fault(self._bag.now, refusal.fault, f"{self.full_name(FLIGHT)}: {refusal}")
             return
+        if end != FLYING and self._steps is None:
+            self.log_end(stamp)
         self._steps = None if end == FLYING else int(steps)
         self._over = time.monotonic()
 

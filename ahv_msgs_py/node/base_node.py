@@ -168,7 +168,7 @@ class BaseNode(ManagedNode):
         qos = self.loop_quality() if topic is not FLIGHT else quality(True)
         listener = Listener(self, message_type, relative(topic.name), qos, read)
         self._opened.append(listener.close)
-        if paces and self.realtime:
+        if paces:
             self.receive(FLIGHT, self._flight_told)
 
     def _is_plant(self, publisher: bytes) -> bool:
@@ -186,21 +186,26 @@ class BaseNode(ManagedNode):
         """Learn that the flight is over: from then on no state is missed."""
         over = values[-1] != FLYING
         if over and not self._flight_over:
-            faults = ", ".join(
-                f"{fault.name.lower().replace('_', ' ')} {count}"
-                for fault, count in self.health.total.items()
-            )
-            self.get_logger().info(
-                f"flight over at {stamp / NANOSECONDS:g} s; faults: {faults or 'none'}"
-            )
+            self.log_end(stamp)
         self._flight_over = over
+
+    def log_end(self, stamp: int) -> None:
+        """Log that the flight is over, and what went wrong in it."""
+        faults = ", ".join(
+            f"{fault.name.lower().replace('_', ' ')} {count}"
+            for fault, count in self.health.total.items()
+        )
+        self.get_logger().info(
+            f"flight over at {stamp / NANOSECONDS:g} s; faults: {faults or 'none'}"
+        )
 
     def _state_came(self, stamp: int, guard: Guard) -> None:
         """Keep the time of the flight; a stamp that goes back starts a new one."""
         self.health.state_came()
         if self.realtime:
             self._state_heard = time.monotonic_ns()
-            self._state_lost = self._flight_over = False
+            self._state_lost = False
+        self._flight_over = False
         if self.now is not None and stamp <= self.now:
             for other in self.heard.values():
                 if other is not guard:
