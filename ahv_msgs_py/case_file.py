@@ -4,6 +4,7 @@
 A node that is given such a file by `--params-file` reads its base as `ahv fly` does.
 """
 
+import logging
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -11,7 +12,14 @@ from pathlib import Path
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES, case_nodes
 from ahv_msgs_py.parameter_file import read_parameter_file
-from ahv_msgs_py.parameters import BASE, SHARED, ParameterError
+from ahv_msgs_py.parameters import (
+    BASE,
+    SIMULATED_TIME,
+    ParameterError,
+    check_time,
+    ignored,
+    meant,
+)
 from ahv_msgs_py.topics import NAMESPACE
 
 EVERY_NODE = "/**"
@@ -26,7 +34,10 @@ def case_names() -> list[str]:
 def case_path(name: str) -> Path:
     """File of a case of the package; ParameterError lists what there is."""
     if name not in case_names():
-        raise ParameterError(f"there is no case {name!r}; valid are {', '.join(case_names())}")
+        raise ParameterError(
+            f"there is no case {name!r}; {meant(name, case_names())}"
+            f"valid are {', '.join(case_names())}"
+        )
     return config_folder() / "cases" / f"{name}.yaml"
 
 
@@ -53,7 +64,8 @@ def _base(name: str) -> Given:
 def read_case_file(path: Path, namespace: str = NAMESPACE) -> Given:
     """Parameters by node, read as nodes in `namespace` do; ParameterError names what is wrong.
 
-    Those of `/**` are given to all nodes that know them.
+    Those of `/**` are given to all nodes that know them; what none knows is ignored, which is
+    logged.
     """
     sections = read_parameter_file(path)
     # of one node in any namespace, or in its own, as ROS has it
@@ -68,14 +80,20 @@ def read_case_file(path: Path, namespace: str = NAMESPACE) -> Given:
     for section in sections:
         if section not in valid:
             raise ParameterError(
-                f"{path.name}: there is no node {section!r}; valid are {', '.join(valid)}"
+                f"{path.name}: there is no node {section!r}; {meant(section, valid)}"
+                f"valid are {', '.join(valid)}"
             )
     shared = sections.get(EVERY_NODE, {})
-    for name in shared:
-        if name not in SHARED:
-            raise ParameterError(
-                f"{path.name}: {EVERY_NODE}: {name!r} is not one of {', '.join(SHARED)}"
-            )
+    known = {
+        node: {BASE} | {parameter.name for parameter in NODES[node].parameters}
+        for node in case_nodes()
+    }
+    check_time(f"{path.name}: {EVERY_NODE}", shared.get(SIMULATED_TIME, False))
+    everything = set().union(*known.values())
+    for name in sorted(shared.keys() - everything - {SIMULATED_TIME}):
+        logging.getLogger(__name__).warning(
+            "%s: %s: %s", path.name, EVERY_NODE, ignored(name, everything)
+        )
     own: Given = {node: {} for node in case_nodes()}
     for section, node in places.items():
         body = sections.get(section, {})
@@ -87,7 +105,8 @@ def read_case_file(path: Path, namespace: str = NAMESPACE) -> Given:
             )
         own[node] |= body
     return {
-        node: with_base(node, {name: shared[name] for name in shared if name in known} | own[node])
+        node: with_base(
+            node, {name: shared[name] for name in shared if name in known[node]} | own[node]
+        )
         for node in case_nodes()
-        for known in [{BASE} | {parameter.name for parameter in NODES[node].parameters}]
     }

@@ -7,7 +7,8 @@ what was meant; a node reads the files of its `--params-file` here before ROS do
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import yaml  # type: ignore[import-untyped]
@@ -49,6 +50,24 @@ def read_parameter_file(path: Path) -> dict[str, dict[str, object]]:
         return _sections(events)
     except _Wrong as wrong:
         raise ParameterError(f"{path.name}, line {wrong.args[0]}: {wrong.args[1]}") from None
+
+
+def given_files(arguments: Sequence[str]) -> list[dict[str, dict[str, object]]]:
+    """Parameters of the files that a command line gives to ROS, each by section."""
+    return [
+        read_parameter_file(Path(value))
+        for option, value in pairwise(arguments)
+        if option == "--params-file"
+    ]
+
+
+def shared_names(files: Iterable[dict[str, dict[str, object]]], node: str) -> set[str]:
+    """Parameters that files give to nodes of any name, and not to `node` by its own."""
+    names: dict[str, set[str]] = {}
+    for sections in files:
+        for section, body in sections.items():
+            names.setdefault(section.rpartition("/")[2], set()).update(body)
+    return (names.get("*", set()) | names.get("**", set())) - names.get(node, set())
 
 
 class _Wrong(Exception):

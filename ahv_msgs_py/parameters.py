@@ -3,11 +3,13 @@
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from difflib import get_close_matches
 from math import isfinite
 from typing import NamedTuple
 
+SIMULATED_TIME = "use_sim_time"  # which ROS gives to every node
 BASE = "base"  # a case of the package, of which a file says what differs
-# What a case file may set for all nodes by `/**`; a node that has no use for one ignores it.
+# What cases set for all nodes by `/**`: a node that has no use for one of them says nothing.
 SHARED = (
     BASE,
     "geometric_altitude",
@@ -57,6 +59,26 @@ class Parameter(NamedTuple):
         return value
 
 
+def check_time(name: str, value: object) -> None:
+    """Refuse simulated time for the node `name`; ParameterError."""
+    if value is not False:
+        raise ParameterError(
+            f"{name}: {SIMULATED_TIME} is {value!r}, but must be False: nodes go by the stamps of "
+            "the plant's states, in real time by the steady clock"
+        )
+
+
+def meant(name: str, valid: Iterable[str]) -> str:
+    """What may have been meant by a name that is not valid, as part of a sentence; else empty."""
+    close = get_close_matches(name, list(valid), 1)
+    return f"did you mean {close[0]!r}? " if close else ""
+
+
+def ignored(name: str, valid: Iterable[str]) -> str:
+    """Words on a parameter that is given to all nodes, of which none of these is one."""
+    return f"there is no parameter {name!r}; {meant(name, valid)}ignored, as it is for all nodes"
+
+
 def check_parameters(
     node: str, parameters: Iterable[Parameter], values: Mapping[str, object]
 ) -> dict[str, Value]:
@@ -65,7 +87,8 @@ def check_parameters(
     for name in values:
         if name not in known:
             raise ParameterError(
-                f"{node}: there is no parameter {name!r}; valid are {', '.join(known)}"
+                f"{node}: there is no parameter {name!r}; "
+                f"{meant(name, known)}valid are {', '.join(known)}"
             )
     return {
         name: parameter.check(node, values.get(name, parameter.default))

@@ -1,19 +1,48 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""What all tests share: a private ROS domain, repeatable random examples."""
+"""What all tests share: a private ROS domain, repeatable random examples, what may be absent."""
 
 import itertools
 import os
+import sys
+from importlib.util import find_spec
 
 import pytest
-from hypothesis import settings
 
 from ahv_msgs_py.node.network import keep_to_this_machine
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 keep_to_this_machine()
-settings.register_profile("ahv", deadline=None, derandomize=True, print_blob=False)
-settings.load_profile("ahv")
+if find_spec("hypothesis"):
+    from hypothesis import settings
 
+    settings.register_profile("ahv", deadline=None, derandomize=True, print_blob=False)
+    settings.load_profile("ahv")
+
+# Packages that only tests need and rosdep may not bring: what imports one that is absent is
+# skipped, a whole file or a test; the summary counts them by package.
+FOR_TESTS = (
+    "ament_flake8",
+    "ament_pep257",
+    "catkin_pkg",
+    "distributed",
+    "hypothesis",
+    "markdown_it",
+    "mcap_ros2",
+    "mpmath",
+    "playwright",
+)
+
+
+class Absent:
+    """Last of the finders: asked only for what no other has found."""
+
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name in FOR_TESTS:
+            pytest.skip(f"{name} is not installed", allow_module_level=True)
+
+
+sys.meta_path.append(Absent)
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # tests run in two processes
 os.environ["ROS_DOMAIN_ID"] = str(99 + WORKER)  # of graphs that are not given a domain
 _domains = itertools.count(os.getpid())

@@ -63,13 +63,14 @@ def test_shared_parameters_reach_every_node_that_knows_them(tmp_path):
     [
         (("k_theta: 0.2", "k_theta: -0.2"), ("outer_intermediate", "k_theta", "-0.2", "0 to 50")),
         (("k_theta: 0.2", "k_theta: fast"), ("k_theta", "'fast'", "a number")),
-        (("k_theta: 0.2", "k_thta: 0.2"), ("k_thta", "k_theta")),
+        (("k_theta: 0.2", "k_thta: 0.2"), ("'k_thta'; did you mean 'k_theta'? valid are",)),
         (("k_u: 0.01", "k_u: .nan"), ("velocity", "k_u", "nan", "0 to 50")),
         (("h: 24100.0", "h: 47500.0"), ("plant", "altitude", "47500", "0 to 47000 m")),
         (("u: 1836.4", "u: 800.0"), ("plant", "speed", "800", "Mach 4 to 24")),
         (("mass: 136077.6", "mass: 1.0"), ("initial.mass", "1.0", "60000 to 140000 kg")),
         (("/**/velocity", "/ahv/speed"), ("/ahv/speed", "/**/velocity")),
-        (("geometric_altitude: false", "geometric: 1"), ("'geometric'",)),
+        (("/**/velocity", "/**/velocty"), ("did you mean '/**/velocity'?",)),
+        (("geometric_altitude: false", "use_sim_time: true"), ("/**", "use_sim_time is True")),
         (
             ("geometric_altitude: false", "geometric_altitude: 1"),
             ("geometric_altitude", "true or"),
@@ -89,6 +90,19 @@ def test_a_wrong_case_is_named(tmp_path, change, words):
     assert "wrong" in sentence or "plant" in sentence
     assert all(word in sentence for word in words), sentence
     assert "\n" not in sentence
+
+
+def test_what_is_for_all_nodes_and_none_knows_is_ignored_with_a_word(tmp_path, caplog):
+    path = tmp_path / "shared.yaml"
+    more = (
+        "geometric_altitude: false\n    altitud: 1.0\n    speed: 1800.0\n    use_sim_time: false"
+    )
+    path.write_text(TEXT.replace("geometric_altitude: false", more).replace("speed: 1786.4", ""))
+    assert load_case(str(path)).control.velocity.speed == 1800.0
+    assert caplog.messages == [
+        "shared.yaml: /**: there is no parameter 'altitud'; did you mean 'altitude'? "
+        "ignored, as it is for all nodes"
+    ]
 
 
 def test_a_number_may_be_written_as_people_do(tmp_path):
@@ -118,5 +132,7 @@ def test_what_a_file_says_goes_before_what_its_base_says(tmp_path):
 def test_a_base_that_is_none_is_named(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("/**:\n  ros__parameters:\n    base: nominal\n")
-    with pytest.raises(ParameterError, match=r"base: there is no case 'nominal'; valid are .*di"):
+    with pytest.raises(
+        ParameterError, match=r"base: there is no case 'nominal'; did .* valid are .*di"
+    ):
         load_case(str(file))

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from catkin_pkg.package import parse_package
 
+from test.conftest import FOR_TESTS
 from test.test_packaging import setup  # noqa: F401  what setup.py hands to setuptools
 
 ROOT = Path(__file__).parent.parent
@@ -75,8 +76,6 @@ def imports(paths):
                 found |= {alias.name.partition(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 found.add(node.module.partition(".")[0])
-            elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
-                found.add(node.args[0].value.partition(".")[0])
     return found - set(sys.stdlib_module_names)
 
 
@@ -117,6 +116,12 @@ def test_package_xml_is_valid():
 
 def test_every_import_is_known():
     assert set(KNOWN) >= RUNNING | TESTING
+
+
+def test_what_only_tests_import_may_be_absent(setup):  # noqa: F811
+    """Then they are skipped: a machine of ROS has its own packages and pytest, and no more."""
+    extra = names(setup["extras_require"]["test"]) - names(setup["install_requires"]) - {"pytest"}
+    assert set(FOR_TESTS) == {name for name in TESTING if KNOWN[name][0] in extra}
 
 
 def test_setup_requires_what_is_imported(setup):  # noqa: F811

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ahv_msgs_py.parameter_file import read_parameter_file
+from ahv_msgs_py.parameter_file import given_files, read_parameter_file, shared_names
 from ahv_msgs_py.parameters import ParameterError
 from test.test_command import ahv
 
@@ -154,3 +154,33 @@ def test_a_node_and_the_command_refuse_the_same_file_in_the_same_words(tmp_path)
     assert node.returncode == command.returncode == 2
     assert node.stderr.strip() == "twice.yaml, line 4: k_u is given twice; once is enough"
     assert command.stderr.strip() == f"ahv: {node.stderr.strip()}"
+
+
+@pytest.mark.unit
+def test_what_is_for_all_nodes_is_told_from_what_is_for_one(tmp_path):
+    paths = [tmp_path / "a.yaml", tmp_path / "b.yaml"]
+    body = ":\n  ros__parameters: "
+    paths[0].write_text(f"/**{body}{{a: 1, b: 1}}\n/**/velocity{body}{{b: 2, c: 2}}\n")
+    paths[1].write_text(f"/ahv/*{body}{{d: 3}}\n/ahv/plant{body}{{a: 4}}\n")
+    options = [word for path in paths for word in ("--params-file", str(path))]
+    files = given_files(["velocity", "--ros-args", *options, "-p", "e:=5"])
+    assert shared_names(files, "velocity") == {"a", "d"}
+    assert shared_names(files, "plant") == {"b", "d"}
+
+
+@pytest.mark.graph
+def test_a_node_ignores_what_is_for_all_and_refuses_what_is_misspelt_for_it(tmp_path):
+    path = tmp_path / "mine.yaml"
+    shared = "/**:\n  ros__parameters:\n    k_x: 1.0\n    lambda: 0.8\n"
+    path.write_text(f"{shared}{AHEAD}    k_uu: 0.01\n")
+    node = subprocess.run(
+        [sys.executable, "-c", NODE_PROGRAM, "--ros-args", "--params-file", path],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    ignored, refused = node.stderr.splitlines()
+    assert ignored.startswith("[WARN]")
+    assert "no parameter 'k_x'; did you mean 'k_u'? ignored, as it is for all nodes" in ignored
+    assert refused.startswith("velocity: there is no parameter 'k_uu'; did you mean 'k_u'? valid")
+    assert node.returncode == 2

@@ -3,6 +3,7 @@
 
 import subprocess
 import sys
+import time
 
 import pytest
 from rcl_interfaces.msg import Log
@@ -40,7 +41,9 @@ def said(graph, tmp_path):  # noqa: F811
     for node in flown.nodes.values():
         node.bring_up()
     flown.executor.spin_until_future_complete(flown.nodes["recorder"].finished, 30.0)
-    for _ in range(20):
+    until = time.monotonic() + 10.0  # the log comes behind what it tells of
+    while sum("flight over" in one.msg for one in found) <= len(LISTENERS):
+        assert time.monotonic() < until, [one.msg for one in found]
         flown.executor.spin_once(0.01)
     return {
         name: [(one.level, one.msg) for one in found if one.name == f"ahv.{name}"]

@@ -161,6 +161,7 @@ class RecorderNode(BaseNode):
                     self._read_flight(data, publisher)
             if topic == SETTINGS.name and messages and self.failure is None:
                 self._read_settings(messages)
+        self.now = self._bag.now
 
     def _is_new(self, topic: str, data: bytes, publisher: bytes, number: int) -> bool:
         """Whether a message is not in the bag yet: who starts to listen again is sent it again."""

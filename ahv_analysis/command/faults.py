@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
 
 from ahv_analysis.command.console import (
     Json,
@@ -38,7 +38,7 @@ def show(context: typer.Context, as_json: Json = False) -> None:
     if as_json:
         print_json({"faults": [dict(zip(COLUMNS, row, strict=True)) for row in rows]})
         return
-    sheet = Table(*COLUMNS, show_lines=True)
+    sheet = Table(Column(COLUMNS[0], no_wrap=True), *COLUMNS[1:], show_lines=True)
     for row in rows:
         sheet.add_row(*row)
     console.print(sheet)

@@ -15,9 +15,9 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from ahv_msgs_py.node.rclpy_internals import RCLError, change_state_service
-from ahv_msgs_py.node.ros_parameters import SIMULATED_TIME, check_time, declare_parameters
+from ahv_msgs_py.node.ros_parameters import declare_parameters
 from ahv_msgs_py.node.warm_up import Law, warm_up
-from ahv_msgs_py.parameters import Parameter, ParameterError, Value
+from ahv_msgs_py.parameters import SIMULATED_TIME, Parameter, ParameterError, Value, check_time
 from ahv_msgs_py.topics import NAMESPACE
 
 REALTIME = Parameter("realtime", False, "100 Hz by the wall clock; if false, lockstep")

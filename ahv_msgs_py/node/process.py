@@ -5,8 +5,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from itertools import pairwise
-from pathlib import Path
 
 import rclpy
 from rclpy.signals import SignalHandlerOptions
@@ -19,7 +17,7 @@ from ahv_msgs_py.node.managed_node import AUTOSTART
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.node.real_time import take_precedence
-from ahv_msgs_py.parameter_file import read_parameter_file
+from ahv_msgs_py.parameter_file import given_files
 from ahv_msgs_py.parameters import ParameterError
 
 LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
@@ -39,9 +37,7 @@ def run(node_class: Callable[[], BaseNode]) -> None:
         signal.signal(number, lambda *_: stop.set())
     try:
         log_where_it_can()
-        for option, value in pairwise(sys.argv):
-            if option == "--params-file":
-                read_parameter_file(Path(value))
+        given_files(sys.argv)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except (RuntimeError, ParameterError) as error:  # arguments that ROS itself refuses
         print(" ".join(str(error).split()), file=sys.stderr)

@@ -1,35 +1,44 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Our parameters as those of a ROS node: declared with description, unit and range."""
 
+import sys
 from collections.abc import Mapping
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from ahv_msgs_py.case_file import with_base
-from ahv_msgs_py.parameters import BASE, SHARED, Parameter, ParameterError, Value, check_parameters
+from ahv_msgs_py.parameter_file import given_files, shared_names
+from ahv_msgs_py.parameters import (
+    BASE,
+    SHARED,
+    SIMULATED_TIME,
+    Parameter,
+    Value,
+    check_parameters,
+    check_time,
+    ignored,
+)
 
-SIMULATED_TIME = "use_sim_time"  # what ROS gives to every node
-
-
-def check_time(name: str, value: object) -> None:
-    """Refuse simulated time for the node `name`; ParameterError."""
-    if value is not False:
-        raise ParameterError(
-            f"{name}: {SIMULATED_TIME} is {value!r}, but must be False: nodes go by the stamps of "
-            "the plant's states, in real time by the steady clock"
-        )
+OF_ROS = (SIMULATED_TIME, "start_type_description_service")  # which it gives to every node
 
 
 def declare_parameters(node: Node, known: Mapping[str, Parameter]) -> dict[str, Value]:
-    """Check what `node` was given, then declare all it knows; ParameterError if it is wrong."""
+    """Check what `node` was given, then declare all it knows; ParameterError if it is wrong.
+
+    What a file gives to all nodes, and this one does not know, it ignores and says so.
+    """
     check_time(node.get_name(), node.get_parameter(SIMULATED_TIME).value)
-    ignored = {SIMULATED_TIME, "start_type_description_service", *SHARED} - {*known, BASE}
+    unused = {*OF_ROS, *SHARED} - {*known, BASE}
     given = {
         key: parameter.value
         for key, parameter in node.get_parameters_by_prefix("").items()
-        if key not in ignored and not key.startswith("qos_overrides.")
+        if key not in unused and not key.startswith("qos_overrides.")
     }
+    unknown = given.keys() - known.keys() - {BASE}
+    for name in sorted(unknown & shared_names(given_files(sys.argv), node.get_name())):
+        del given[name]
+        node.get_logger().warning(ignored(name, known))
     given = with_base(node.get_name(), given)
     values = check_parameters(node.get_name(), known.values(), given)
     for parameter in known.values():
