@@ -54,7 +54,7 @@ class Flight:
 
     def summary(self) -> dict[str, Any]:
         """Verdict, extremes and end, as `ahv fly --json` prints them."""
-        return summarize(self.record, self.ended_early, self.case.control)
+        return summarize(self.record, self.ended_early)
 
 
 def fly(

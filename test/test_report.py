@@ -125,7 +125,7 @@ def test_a_learner_that_learned_misses_less_than_it_did_at_first():
 def test_summary_and_report_have_one_definition():
     case = short("nominal_di")
     flown = record(fly(case), False)
-    summary, metrics = summarize(flown, "", case.control), measure(flown, case.control)
+    summary, metrics = summarize(flown, ""), measure(flown, case.control)
     assert summary["fuel_kg"] == metrics["fuel_kg"] > 0
     assert summary["max_abs_alpha_deg"] == metrics["margins"]["alpha"]["largest_deg"]
     assert summary["success"] is (margins(flown)["alpha"].first_beyond_s is None)

@@ -3,13 +3,19 @@
 
 import pytest
 
+from ahv_analysis.bag.reader import read_bag
 from ahv_analysis.bag.record import record
+from ahv_analysis.bag.solver_status import lost_status, surfaces_lost_at
+from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.campaign.batch import fly_alone
 from ahv_analysis.flight.case import load_case
-from ahv_analysis.flight.library import fly, fly_library
+from ahv_analysis.flight.library import fly, fly_library, write_step
+from ahv_analysis.flight.one_process import fly_graph
 from ahv_analysis.flight.outcome import Cause
 from ahv_analysis.report.page_flight import read_flights
 from ahv_analysis.report.summary import summarize
+from ahv_control.newton_raphson import SolverStatus
+from ahv_msgs_py.topics import NAMESPACE
 
 SHORT = {"duration": 2.0}
 
@@ -17,7 +23,7 @@ SHORT = {"duration": 2.0}
 def verdicts(case):
     """What a campaign makes of a case, and what the summary of its flight does."""
     steps = list(fly(case))
-    found = summarize(record(steps, False), steps[-1].ended_early, case.control)
+    found = summarize(record(steps, False), steps[-1].ended_early)
     alone = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
     assert found["success"] == (found["cause"] == "success")
     return Cause(int(alone.cause)).name.lower(), found["cause"]
@@ -56,3 +62,42 @@ def test_a_report_says_that_the_surfaces_lost_a_vehicle(tmp_path):
     (flight,) = read_flights([tmp_path / "bag"])
     assert flight.verdict.word == "failure"
     assert "the surfaces lost the vehicle" in flight.verdict.reason
+
+
+def test_graph_and_library_tell_alike_of_surfaces_that_were_lost(tmp_path):
+    """At the same step: here after the angle of attack has left its bound."""
+    case = load_case("nominal_di", {"duration": 1.5, "dispersion.Cm": 0.05})
+    statuses = [(step.stamp, step.commands.status) for step in fly(case)]
+    lost_at = next(stamp for stamp, status in statuses if status == SolverStatus.SINGULAR)
+    assert lost_at == 1_400_000_000
+    for fly_case in (fly_graph, fly_library):
+        bag = tmp_path / fly_case.__name__
+        ended_early, _ = fly_case(case, bag)
+        flown = read_bag(bag)
+        assert flown.surfaces_lost_at == lost_at
+        assert summarize(flown, ended_early)["cause"] == "inlet_unstart"
+
+
+def test_another_inner_loop_is_not_judged_by_our_solver(tmp_path):
+    """It had no trouble where ours would have lost the vehicle, and says so by saying nothing."""
+    case = load_case("nominal_di", SHORT)
+    slow = case.plant.initial._replace(u=1.0, w=0.0)
+    case = case._replace(plant=case.plant._replace(initial=slow))
+    first = next(fly(case))
+    assert first.commands.status == SolverStatus.SINGULAR
+    for status, cause in ((SolverStatus.SINGULAR, "surfaces_lost_the_vehicle"), (0, "success")):
+        bag = BagWriter(tmp_path / cause)
+        write_step(bag, first._replace(commands=first.commands._replace(status=status)))
+        bag.close()
+        assert summarize(read_bag(tmp_path / cause), "")["cause"] == cause
+
+
+def test_only_the_inner_loop_of_the_flight_is_believed():
+    word = lost_status(0)
+    ours = 1, word.replace(b"newton singular", b"all is healthy.")
+    assert surfaces_lost_at([(1, word)], NAMESPACE) == 0
+    assert surfaces_lost_at([(1, word)], "/another") is None, "another vehicle"
+    assert surfaces_lost_at([(1, word.replace(b"inner", b"outer"))], NAMESPACE) is None
+    assert surfaces_lost_at([ours, (2, word), ours], NAMESPACE) is None, "another publisher"
+    assert surfaces_lost_at([ours, (2, word)], NAMESPACE) == 0, "one that was started again"
+    assert surfaces_lost_at([(1, word[:20])], NAMESPACE) is None, "no message"

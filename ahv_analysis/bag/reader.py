@@ -4,26 +4,25 @@
 from collections.abc import Collection, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from struct import error as StructError
 from typing import NamedTuple
 
 import numpy as np
 from mcap.records import Channel, Metadata, Schema
 from numpy.typing import NDArray
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag.files import bag_files
 from ahv_analysis.bag.mcap_scan import HEAD, Block, Damage, scan
+from ahv_analysis.bag.messages import deserialized
 from ahv_analysis.bag.metadata import custom_of_record
 from ahv_analysis.bag.notes import Notes, read_notes
 from ahv_analysis.bag.plain_file import ZSTD_MAGIC, PlainFile, UnpackError
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.bag.series import AmbiguousError, Collector, Refused, Series
+from ahv_analysis.bag.solver_status import says_inner_loop, surfaces_lost_at
 from ahv_analysis.errors import BagError
-from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
+    DIAGNOSTICS,
     DISTURBANCE_ESTIMATE,
     LEARNER,
     LEARNER_TOPICS,
@@ -39,7 +38,6 @@ from ahv_msgs_py.topics import (
     within,
 )
 
-_STORE = get_typestore(Stores.ROS2_JAZZY)
 _LOOP = {relative(topic.name): topic for topic in LOOP_TOPICS}
 
 
@@ -62,6 +60,7 @@ class Bag(NamedTuple):
     refused: list[Refused]  # messages of the control loop that no receiver obeyed
     kept: dict[str, list[bytes]]  # messages of the topics asked for, CDR
     namespace: str  # of the vehicle that flew
+    surfaces_lost_at: int | None  # [ns] when its inner loop said so first
 
 
 class Recorded(NamedTuple):
@@ -107,6 +106,7 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
     topics: dict[str, Held] = {}
     own: list[Metadata] = []
     kept: dict[str, list[bytes]] = {name: [] for name in keep}
+    diagnostics: list[tuple[int, bytes]] = []  # with the number of their publisher
     others: dict[str, str] = {}  # topics of the loop with messages of another type
     found = bag_files(path)
     for portion in _portions(found.path, found.files, topics, own):
@@ -119,6 +119,8 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
             others[name] = portion.type_name
         elif name in kept:
             kept[name] += [data for _, data in portion.bodies()]
+        if (name, portion.type_name) == (DIAGNOSTICS.name, DIAGNOSTICS.type_name):
+            diagnostics += [entry for entry in portion.bodies() if says_inner_loop(entry[1])]
     namespace = _namespace(found.path, topics)
     series: dict[LoopTopic, Series] = {}
     refused: list[Refused] = []
@@ -146,8 +148,18 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
     else:
         custom = custom_of_record(own[0]) if own else {}
     size = sum(file.stat().st_size for file in found.files)
+    lost_at = surfaces_lost_at(diagnostics, namespace)
     return Bag(
-        found.path, size, custom, read_notes(custom), topics, series, refused, kept, namespace
+        found.path,
+        size,
+        custom,
+        read_notes(custom),
+        topics,
+        series,
+        refused,
+        kept,
+        namespace,
+        lost_at,
     )
 
 
@@ -275,6 +287,7 @@ def flight_of(bag: Bag) -> FlightRecord:
         bag.notes is not None and bag.notes.geometric,
         arrays.get(LEARNER),
         None if estimates is None else estimates[:, 3:],
+        bag.surfaces_lost_at,
     )
 
 
@@ -293,17 +306,5 @@ def _required(bag: Bag) -> tuple[LoopTopic, ...]:
 
 
 def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:
-    """Read a message of another sender, whose layout is not the usual one.
-
-    With the reader of rosbags, though not through its front door, which refuses the surplus bytes
-    that rclpy leaves behind the end.
-    """
-    if data[:2] not in (b"\x00\x00", b"\x00\x01"):
-        raise MessageError("a message of an unknown encoding")
-    definition = _STORE.get_msgdef(topic.layout.type_name)
-    read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
-    try:
-        message, _ = read(data[4:], 0, definition.cls, _STORE)
-    except (SerdeError, StructError, ValueError, IndexError) as error:
-        raise MessageError("a message whose bytes are none of the topic's type") from error
-    return topic.layout.values_of(message)
+    """Read a message of another sender, whose layout is not the usual one."""
+    return topic.layout.values_of(deserialized(data, topic.layout.type_name))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.law import Commands
 from ahv_control.learner_message import learner_values
-from ahv_control.newton_raphson import nominal_response
+from ahv_control.newton_raphson import SolverStatus, nominal_response
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_plant.model.aerodynamics import AirData, air_data
 from ahv_plant.model.constants import UNSTART_ALPHA
@@ -36,6 +36,7 @@ class FlightRecord:
     geometric: bool  # h is a geometric altitude
     learner: Array | None = None  # (N+1, 39) X_a, X_d [rad/s] and weights, of an adaptive flight
     estimates: Array | None = None  # (N+1, 3) d-hat [rad/s^2], of an adaptive flight
+    surfaces_lost_at: int | None = None  # [ns] when the surfaces first could not turn the vehicle
 
     @property
     def steps(self) -> int:
@@ -119,11 +120,14 @@ class Step(NamedTuple):
 def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     """Arrays of the steps of a library flight."""
     stamps = array("q")
+    lost_at = None
     states, attitudes, rates, surfaces, throttles, learners, estimates = (
         array("d") for _ in range(7)
     )
     for step in steps:
         stamps.append(step.stamp)
+        if lost_at is None and step.commands.status == SolverStatus.SINGULAR:
+            lost_at = step.stamp
         states.extend(step.state)
         attitudes.extend(step.commands.attitude)
         rates.extend(step.commands.rates)
@@ -144,4 +148,5 @@ def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
         geometric,
         np.frombuffer(learners).reshape(count, -1) if learners else None,
         np.frombuffer(estimates).reshape(count, -1) if estimates else None,
+        lost_at,
     )

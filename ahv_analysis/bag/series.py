@@ -64,6 +64,27 @@ class _Growing:
         return self._data
 
 
+def _told_apart(publishers: NDArray[np.uint32]) -> bool:
+    numbers = np.unique(publishers)
+    return 0 not in numbers and len(numbers) <= MOST_PUBLISHERS
+
+
+def obeyed(publishers: NDArray[np.uint32]) -> NDArray[np.bool_]:
+    """Which messages (n,) are of the publisher that is obeyed; all where none are told apart."""
+    heard = np.zeros(len(publishers), bool)
+    if not _told_apart(publishers):
+        return ~heard
+    _, voices = np.unique(publishers, return_inverse=True)
+    last = np.zeros(len(publishers), np.int64)
+    last[voices] = np.arange(len(voices))
+    place = 0
+    while place < len(voices):
+        end = int(last[voices[place]]) + 1
+        heard[place:end] = voices[place:end] == voices[place]
+        place = end
+    return heard
+
+
 class Collector:
     """Takes the messages of one topic as they come in a bag."""
 
@@ -124,11 +145,14 @@ class Collector:
         publishers = self._publishers.rows()[:, 0]
         if np.all(publishers == publishers[:1]) and np.all(stamps[1:] > stamps[:-1]):
             return Series(stamps, values)
-        numbers, voices = np.unique(publishers, return_inverse=True)
-        told = 0 not in numbers and len(numbers) <= MOST_PUBLISHERS
+        told = _told_apart(publishers)
         if told:
-            obeyed = self._obeyed(voices, stamps)
-            stamps, values = stamps[obeyed], values[obeyed]
+            heard = obeyed(publishers)
+            others = stamps[~heard]
+            if len(others):
+                when = others[0] / NANOSECONDS
+                self._refuse(Fault.SECOND_PUBLISHER, len(others), f"from {when:g} s on")
+            stamps, values = stamps[heard], values[heard]
             if self._topic is STATE and np.any((stamps[1:] == 0) & (stamps[:-1] > 0)):
                 raise AmbiguousError(f"{self._name} starts again at 0 s")
         order = np.argsort(stamps, kind="stable")
@@ -148,22 +172,6 @@ class Collector:
                     f"two messages on {self._name} differ and have one stamp, {when:g} s"
                 )
         return Series(stamps[first], values[first])
-
-    def _obeyed(self, voices: NDArray[np.int64], stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which messages (n,) are of the publisher that is obeyed at their time."""
-        last = np.zeros(int(voices.max()) + 1, np.int64)
-        last[voices] = np.arange(len(voices))
-        obeyed = np.zeros(len(voices), bool)
-        place = 0
-        while place < len(voices):
-            end = int(last[voices[place]]) + 1
-            obeyed[place:end] = voices[place:end] == voices[place]
-            place = end
-        others = np.flatnonzero(~obeyed)
-        if len(others):
-            when = stamps[others[0]] / NANOSECONDS
-            self._refuse(Fault.SECOND_PUBLISHER, len(others), f"from {when:g} s on")
-        return obeyed
 
     @property
     def refused(self) -> list[Refused]:

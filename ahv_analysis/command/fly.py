@@ -131,7 +131,7 @@ def fly(
     missing = missing_states(held, int(flown))
     summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
     summary["dispersion"] = flight.plant.truth.dispersion._asdict()
-    summary |= summarize(record, ended_early, flight.control, missing)
+    summary |= summarize(record, ended_early, missing)
     summary["refused"] = refused_facts(held)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     with signals_wait():

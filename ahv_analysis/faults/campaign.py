@@ -424,7 +424,7 @@ def _unreadable(bag: Path) -> str:
         facts = bag_info(bag)
         flight = read_flights([bag])[0]
         assert flight.case is not None
-        summarize(flight.record, flight.ended_early, flight.case.control)
+        summarize(flight.record, flight.ended_early)
         page = render([flight])
     except (BagError, AssertionError) as error:
         return str(error) or "it has no notes"

@@ -6,16 +6,19 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from ahv_analysis.bag.record import Step
+from ahv_analysis.bag.solver_status import lost_status
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.closed_loop import Loop, loop_step, start_loop
 from ahv_analysis.interrupt import signals_wait
 from ahv_control.disturbance_learner import disturbance_estimate
 from ahv_control.learner_message import estimate_values, learner_values
+from ahv_control.newton_raphson import SolverStatus
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
     CLOCK,
+    DIAGNOSTICS,
     DISTURBANCE_ESTIMATE,
     LEARNER,
     RATE_COMMAND,
@@ -95,3 +98,5 @@ def write_step(bag: BagWriter, step: Step) -> None:
         messages.append((DISTURBANCE_ESTIMATE, estimate_values(estimate)))
     for topic, values in messages:
         bag.write(topic.name, topic.layout.encode(step.stamp, values))
+    if answers.status == SolverStatus.SINGULAR:
+        bag.write(DIAGNOSTICS.name, lost_status(step.stamp))

@@ -12,7 +12,7 @@ from ahv_control.disturbance_learner import LearnerState
 from ahv_plant.model.constants import UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementary import atan2, atan_ratio
-from ahv_plant.numerics.elementwise import elementwise, select
+from ahv_plant.numerics.elementwise import elementwise, kernel, select
 from ahv_plant.termination import termination
 
 
@@ -65,6 +65,20 @@ def cause_now(state: State, status: int, geometric: bool) -> float:
     lost = select(status == 3, 3.0, unstart)
     outside = select(left == 2, 2.0, lost)
     return select(left == 1, 1.0, outside)
+
+
+@kernel
+def first_cause(states, lost, geometric):
+    """Cause at the first of `states` (n, 13) that has one, if the surfaces are lost at `lost`."""
+    for step in range(len(states)):
+        s = states[step]
+        state = State(
+            s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11], s[12]
+        )
+        cause = cause_now(state, 3 if step == lost else 0, geometric)
+        if cause != 0.0:
+            return cause
+    return 0.0
 
 
 @elementwise

@@ -90,7 +90,7 @@ def _read(bag: Path, name: str) -> Flight:
     case = make_case(notes.case, notes.parameters) if notes else None
     metrics = measure(record, case.control if case else None)
     ended_early = why_ended_early(record, case) if case else ""
-    cause = failure(record, ended_early, case.control) if case else None
+    cause = failure(record, ended_early) if case else None
     content = notes.content if notes else {}
     refused = refused_facts(held)
     return Flight(name, bag, record, content, case, metrics, ended_early, cause, refused)
