@@ -14,7 +14,7 @@ from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
-from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.reader import flight_of, read, read_bag
 from ahv_analysis.bag.record import record
 from ahv_analysis.bag.recorder_node import CONTINUE, RecorderNode
 from ahv_analysis.bag.recovery import recover
@@ -88,9 +88,13 @@ def test_killed_recorders_leave_bags_that_recover(tmp_path, domain):
     """Three at random moments of one flight; `python -m test.kill_recorder` times the loss."""
     draw = random.Random(5)
     moments = [draw.uniform(0.3, 1.5) for _ in range(3)]
-    flown = record(fly(load_case("nominal_di", {"duration": 150.0})), False)
+    case = load_case("nominal_di", {"duration": 150.0})
+    flown = record(fly(case), False)
     for kill in kill_recorders(tmp_path, moments, domain):
-        kept = read_bag(kill.recovered)
+        bag = read(kill.recovered)
+        assert bag.notes.planned == 150.0 and "versions" in bag.notes.content
+        assert bag.notes.parameters["inner_loop"] == case.parameters["inner_loop"]
+        kept = flight_of(bag)
         assert 0 < kill.left <= kept.steps <= kill.step + 1
         assert kept.stamps.tolist() == flown.stamps[: kept.steps + 1].tolist()
         assert kept.states.tobytes() == flown.states[: kept.steps + 1].tobytes()

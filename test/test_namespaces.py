@@ -79,6 +79,18 @@ def test_each_replays_without_a_difference(bags, namespace, ahv):  # noqa: F811
     assert result["compared"] == 501 * (4 if namespace == "/uav1" else 6)
 
 
+def test_a_difference_is_told_by_the_names_of_the_vehicle(bags, tmp_path, ahv):  # noqa: F811
+    """With a case file for nodes of its namespace, which is read as they would read it."""
+    other = tmp_path / "other.yaml"
+    shared = "/**:\n  ros__parameters:\n    base: nominal_di\n"
+    other.write_text(f"{shared}/uav1/velocity:\n  ros__parameters:\n    k_u: 0.02\n")
+    done = ahv("replay", bags["/uav1"], "--parameters", other, "--json")
+    result = json.loads(done.stdout)
+    assert (done.exit_code, result["differences"]) == (1, 501)
+    assert result["first"]["topic"] == "/uav1/throttle_command"
+    assert result["nodes"]["velocity"]["largest"]["topic"] == "/uav1/throttle_command"
+
+
 def test_reports_of_both_are_of_their_cases(bags, tmp_path, ahv):  # noqa: F811
     assert ahv("report", *bags.values(), "--out", tmp_path).exit_code == 0
     pages = [path.read_text() for path in sorted(tmp_path.glob("*.html"))]

@@ -83,9 +83,9 @@ def changed_case(tmp_path):
     """Write the file of a case with one parameter multiplied."""
 
     def write(name, node, parameter, factor):
-        content = yaml.safe_load((ROOT / "config" / "cases" / f"{name}.yaml").read_text())
-        settings = content[node]["ros__parameters"]
-        settings[parameter] *= factor
+        value = load_case(name).parameters[node.rpartition("/")[2]][parameter]
+        given = {"/**": {"base": name}, node: {parameter: factor * value}}
+        content = {section: {"ros__parameters": values} for section, values in given.items()}
         file = tmp_path / "changed.yaml"
         file.write_text(yaml.safe_dump(content))
         return file

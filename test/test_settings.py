@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from ahv_analysis.bag.recorder_node import completed, told_of
+from ahv_analysis.bag.notes import told_notes, told_of
+from ahv_analysis.bag.recorder_node import completed
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.one_process import fly_graph
@@ -37,6 +38,36 @@ def test_a_flight_of_nodes_alone_is_replayed_by_what_they_told(
     assert "numba" in told["notes"]["versions"]
     result = json.loads(ahv("replay", tmp_path / "bag", "--json").stdout)
     assert (result["compared"], result["differences"]) == (6 * 101, 0)
+
+
+def test_a_bag_of_the_stock_recorder_is_replayed_by_what_it_holds_of_settings(
+    tmp_path,
+    domain,
+    monkeypatch,
+    ahv,  # noqa: F811
+):
+    """As rosbag2 makes one: every topic, and no notes of anybody."""
+    monkeypatch.setattr("ahv_analysis.flight.one_process.notes", lambda case: "")
+    monkeypatch.setattr(BagWriter, "annotate", lambda self, notes: None)
+    case = load_case("nominal_di", {"duration": 1.0})
+    fly_graph(case, tmp_path / "bag", domain=domain, namespace="/uav1")
+    assert "ahv: ''" in (tmp_path / "bag" / "metadata.yaml").read_text()
+    told = json.loads(ahv("bag", "info", tmp_path / "bag", "--json").stdout)
+    assert (told["case"], told["planned_s"]) == ("unnamed", 1.0)
+    result = json.loads(ahv("replay", tmp_path / "bag", "--json").stdout)
+    assert (result["compared"], result["differences"]) == (4 * 101, 0)
+
+
+def test_of_two_settings_of_a_node_the_later_stands_and_strangers_are_passed_over():
+    def said(node, **settings):
+        return text_bytes(json.dumps({"node": node, "settings": settings}))
+
+    told = [said("plant", duration=1.0), b"hm", said("guest", x=1), said("inner_loop", k_P=2.0)]
+    assert told_notes(told[:1]) is None
+    assert told_notes([*told, said("plant", duration=2.0)]).parameters == {
+        "plant": {"duration": 2.0},
+        "inner_loop": {"k_P": 2.0},
+    }
 
 
 def test_what_is_noted_is_not_told_again():

@@ -2,12 +2,16 @@
 """The custom data of a bag: other people's texts, until they are found to be ours."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
 
+from ahv_msgs_py.graph import case_nodes
+from ahv_msgs_py.layout import MessageError, text_of
 from ahv_msgs_py.parameters import Value
 
 NOTES = "ahv"  # key of the notes of a flight
+UNNAMED = "unnamed"  # case of nodes that were started by hand
 RECOVERED = "ahv_recovered"  # key of what was lost before a recovery
 _NODES = ("plant", "inner_loop")  # without which there is no flight
 
@@ -49,6 +53,25 @@ def read_notes(custom: Mapping[str, str]) -> Notes | None:
         if not all(isinstance(value, bool | int | float | str) for value in values.values()):
             return None
     return Notes(case, parameters, content)
+
+
+def told_of(data: bytes) -> tuple[str, dict[str, Value]]:
+    """A node and its settings as it told them; MessageError if they are none."""
+    try:
+        told = json.loads(text_of(data))
+        return str(told["node"]), dict(told["settings"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise MessageError(f"no settings of a node: {error}") from error
+
+
+def told_notes(messages: Iterable[bytes]) -> Notes | None:
+    """Notes by what the nodes of a flight told of their settings, for a bag that has no others."""
+    told: dict[str, dict[str, Value]] = {}
+    for data in messages:
+        with suppress(MessageError):  # what is no setting says nothing of the flight
+            node, settings = told_of(data)
+            told |= {node: settings} if node in case_nodes() else {}
+    return read_notes({NOTES: json.dumps({"case": UNNAMED, "parameters": told})})
 
 
 def read_losses(custom: Mapping[str, str]) -> dict[str, Any] | None:

@@ -14,7 +14,7 @@ from ahv_analysis.bag.files import bag_files
 from ahv_analysis.bag.mcap_scan import HEAD, Block, Damage, scan
 from ahv_analysis.bag.messages import deserialized
 from ahv_analysis.bag.metadata import custom_of_record
-from ahv_analysis.bag.notes import Notes, read_notes
+from ahv_analysis.bag.notes import Notes, read_notes, told_notes
 from ahv_analysis.bag.plain_file import ZSTD_MAGIC, PlainFile, UnpackError
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.bag.series import AmbiguousError, Collector, Refused, Series
@@ -30,6 +30,7 @@ from ahv_msgs_py.topics import (
     NAMESPACE,
     NOMINAL_TOPICS,
     RATE_COMMAND,
+    SETTINGS,
     STATE,
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
@@ -38,6 +39,7 @@ from ahv_msgs_py.topics import (
     within,
 )
 
+_SETTINGS = relative(SETTINGS.name), SETTINGS.type_name
 _LOOP = {relative(topic.name): topic for topic in LOOP_TOPICS}
 
 
@@ -54,7 +56,7 @@ class Bag(NamedTuple):
     path: Path
     bytes: int  # of its files
     custom: dict[str, str]  # texts by their keys
-    notes: Notes | None  # of `ahv fly`; None in other bags
+    notes: Notes | None  # of its recorder, else of what the nodes told; None if nobody did
     topics: dict[str, Held]  # by name, those without messages too
     series: dict[LoopTopic, Series]  # of the control loop: topics with messages that were obeyed
     refused: list[Refused]  # messages of the control loop that no receiver obeyed
@@ -107,6 +109,7 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
     own: list[Metadata] = []
     kept: dict[str, list[bytes]] = {name: [] for name in keep}
     diagnostics: list[tuple[int, bytes]] = []  # with the number of their publisher
+    told: dict[str, list[bytes]] = {}  # settings of nodes, by topic
     others: dict[str, str] = {}  # topics of the loop with messages of another type
     found = bag_files(path)
     for portion in _portions(found.path, found.files, topics, own):
@@ -117,6 +120,8 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
             _collect(portion, topic, collectors[name])
         elif topic is not None:
             others[name] = portion.type_name
+        elif (name.rpartition("/")[2], portion.type_name) == _SETTINGS:
+            told.setdefault(name, []).extend(data for _, data in portion.bodies())
         elif name in kept:
             kept[name] += [data for _, data in portion.bodies()]
         if (name, portion.type_name) == (DIAGNOSTICS.name, DIAGNOSTICS.type_name):
@@ -147,13 +152,14 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
         custom = found.metadata.custom
     else:
         custom = custom_of_record(own[0]) if own else {}
+    notes = read_notes(custom) or told_notes(told.get(within(namespace, SETTINGS.name), []))
     size = sum(file.stat().st_size for file in found.files)
     lost_at = surfaces_lost_at(diagnostics, namespace)
     return Bag(
         found.path,
         size,
         custom,
-        read_notes(custom),
+        notes,
         topics,
         series,
         refused,

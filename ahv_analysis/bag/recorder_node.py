@@ -10,11 +10,12 @@ from pathlib import Path
 import rclpy
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
+from ahv_analysis.bag.notes import UNNAMED, told_of
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
 from ahv_analysis.versions import versions
 from ahv_msgs_py.graph import case_nodes
-from ahv_msgs_py.layout import MessageError, text_of
+from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.guard import Guard, Refusal, participant
@@ -37,7 +38,6 @@ from ahv_msgs_py.topics import (
 )
 
 STOP, CONTINUE = "stop", "continue"
-UNNAMED = "unnamed"  # case of nodes that were started by hand
 RECORDER_PARAMETERS = (
     Parameter("bag", "bag", "folder of the bag to write; it must not exist"),
     Parameter(
@@ -238,15 +238,6 @@ class RecorderNode(BaseNode):
                 if self.failure is None:
                     self._fail(error)
         self._bag = None
-
-
-def told_of(data: bytes) -> tuple[str, dict[str, Value]]:
-    """A node and its settings as it told them; MessageError if they are none."""
-    try:
-        told = json.loads(text_of(data))
-        return str(told["node"]), dict(told["settings"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise MessageError(f"no settings of a node: {error}") from error
 
 
 def completed(notes: str, told: Mapping[str, Mapping[str, Value]]) -> str:

@@ -21,7 +21,6 @@ from ahv_analysis.command.console import (
 from ahv_analysis.command.figures import write_figures
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.topics import NAMESPACE
 
 if TYPE_CHECKING:  # these need ROS, which other commands do without
     from ahv_analysis.flight.case import Case
@@ -92,7 +91,7 @@ def _case(recording: "Recording", parameters: str | None) -> "Case":
     from ahv_analysis.flight.case import load_case, make_case
 
     if parameters is not None:
-        return load_case(parameters)
+        return load_case(parameters, namespace=recording.namespace)
     if recording.notes is None:
         raise BagError(
             f"{recording.path} does not say with which parameters it was flown: "
@@ -154,7 +153,7 @@ def _show(result: dict[str, Any], flown: "Replay", out: Path | None) -> None:
     for entry in flown.comparisons:
         sheet.add_row(
             entry.node,
-            entry.topic.removeprefix(f"{NAMESPACE}/"),
+            entry.topic.rpartition("/")[2],
             str(entry.compared) if entry.in_bag else "-",
             str(entry.differences) if entry.in_bag else "-",
             f"{abs(entry.largest.size):.3g}" if entry.largest else "",

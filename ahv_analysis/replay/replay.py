@@ -142,6 +142,7 @@ def replay(
         compare(
             name,
             topic,
+            within(recording.namespace, topic.name),
             recording.topics.get(topic),
             commanded[topic],
             graph.complete[name],

@@ -57,11 +57,12 @@ class Comparison(NamedTuple):
 def compare(
     node: str,
     topic: LoopTopic,
+    name: str,
     recorded: Series | None,
     replayed: Series,
     complete: NDArray[np.int64],
 ) -> Comparison:
-    """Compare what `node` commanded on `topic`, by stamp [ns], bit for bit.
+    """Compare what `node` commanded on `topic`, in the bag as `name`, by stamp [ns], bit for bit.
 
     `recorded` is None if the bag does not have the topic; `complete` are the stamps of the steps
     that the node had all inputs of.
@@ -81,7 +82,7 @@ def compare(
                 Difference(
                     int(common[row]),
                     node,
-                    topic.name,
+                    name,
                     topic.layout.fields[column],
                     float(before[row, column]),
                     float(after[row, column]),
@@ -93,7 +94,7 @@ def compare(
             )
     return Comparison(
         node,
-        topic.name,
+        name,
         recorded is not None,
         len(common),
         differing,
