@@ -11,9 +11,14 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from ahv_msgs_py.node.deadline import end_within
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 CLEAR_LINE_AND_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # after a progress bar
 
+LONGEST_LEAVE = 2.0  # [s] for what is left to the very end
+
+_last: list[Callable[[], None]] = []  # to be done when all has been said
 _words: Callable[[], str] = str  # what is to be said of an interrupted command
 
 
@@ -60,6 +65,19 @@ def interrupted_says(words: Callable[[], str]) -> None:
     _words = words
 
 
+def last_of_all(work: Callable[[], None]) -> None:
+    """Have `work`, which may hang, done when the command has said all, an interrupted one too."""
+    _last.append(work)
+
+
+def do_the_last(code: int) -> None:
+    """Do what was left to the end; this process ends with exit code `code` if that takes long."""
+    if _last:
+        end_within(LONGEST_LEAVE, code)
+    while _last:
+        _last.pop()()
+
+
 def _end(number: int, frame: object) -> None:
     said = " ".join(("ahv: interrupted", *filter(None, [_words()])))
     # not through sys.stderr, which may be in the middle of a line, nor before a thread that draws
@@ -68,4 +86,6 @@ def _end(number: int, frame: object) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     clear = CLEAR_LINE_AND_SHOW_CURSOR if os.isatty(terminal) else b""
     os.write(terminal, clear + said.encode(errors="backslashreplace") + b"\n")
+    let_no_signal_end()
+    do_the_last(128 + number)
     os._exit(128 + number)

@@ -10,9 +10,11 @@ from contextlib import contextmanager
 from ipaddress import ip_address
 from pathlib import Path
 from textwrap import wrap
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from rclpy.qos import ReliabilityPolicy
 
 from ahv_analysis.bag.reader import read_bag
 from ahv_analysis.bag.record import record
@@ -35,12 +37,13 @@ from ahv_analysis.flight.process_per_node import (
 from ahv_msgs_py.node.faults import PERIOD
 from ahv_msgs_py.node.network import DISCOVERY_RANGE, PROFILES, keep_to_this_machine
 from ahv_msgs_py.node.real_time import PRIORITY
-from ahv_msgs_py.topics import SURFACE_COMMAND
+from ahv_msgs_py.topics import STATE, SURFACE_COMMAND
 from ahv_plant.model.constants import DEGREES, STEP_NS
 from test.ends import beside
 from test.ends import fly as fly_by_command
 
 CASE = "neuro_adaptive_sc_gdi"
+DDS = "{http://www.eprosima.com}"  # namespace of Fast DDS's profiles
 TRACKING = 0.5  # [deg], [deg/s] within which a disturbed flight is back
 LONGEST_OUTAGE = 2.0  # [s] that a vehicle is safe without a controller
 RECOVERY = 30.0  # [s] of flight for that: the pitch loop's time constant is 10 s
@@ -102,7 +105,8 @@ def watched(name, until, realtime=True):
     spectator = Spectator()
     try:
         case = load_case(name, {"duration": 3600.0})
-        with ProcessGraph(case, None, realtime, spectators=1) as graph:
+        graph = ProcessGraph(case, None, realtime, spectators=1)
+        with spectator.looking_on(), graph:
             deadline = time.monotonic() + 30.0
             while spectator.stamp < until * STEP_NS and time.monotonic() < deadline:
                 spectator.look(0.1)
@@ -198,6 +202,26 @@ def test_in_real_time_every_thread_of_a_node_goes_before_ordinary_ones(realtime)
             threads = [int(task.name) for task in Path(f"/proc/{process.pid}/task").iterdir()]
             policies = {os.sched_getscheduler(thread) for thread in threads}
             assert policies == {os.SCHED_FIFO if fifo else os.SCHED_OTHER}, name
+
+
+def test_in_real_time_nobody_waits_for_what_is_lost():
+    """Controllers hear the newest state at best effort; writers ask 20 times a second for losses.
+
+    Reliable, and asked every 3 s as Fast DDS would by itself, a node that was held up is deaf
+    until it is asked.
+    """
+    with watched("nominal_di", 1) as (graph, spectator):
+        profile = Path(os.environ[PROFILES])  # of this process and of all that it starts
+        hears = {
+            listener.node_name: listener.qos_profile.reliability
+            for listener in spectator._node.get_subscriptions_info_by_topic(STATE.name)
+        }
+    assert {hears[name] for name in graph.controllers} == {ReliabilityPolicy.BEST_EFFORT}
+    (writer,) = ElementTree.parse(profile).iter(f"{DDS}data_writer")
+    assert writer.get("is_default_profile") == "true"
+    (period,) = writer.iter(f"{DDS}heartbeatPeriod")
+    seconds, nanoseconds = (int(period.find(f"{DDS}{unit}").text) for unit in ("sec", "nanosec"))
+    assert seconds + 1e-9 * nanoseconds <= 0.05
 
 
 def minor_faults(pid):

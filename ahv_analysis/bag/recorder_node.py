@@ -146,6 +146,9 @@ class RecorderNode(BaseNode):
             self._end("")
 
     def _take(self) -> None:
+        """Take what has come, until the bag is closed."""
+        if self._bag is None:
+            return
         for topic, subscription in self._polled.items():
             taken = [message for message in subscription if self._is_new(topic, *message)]
             messages = [data for data, _, _ in taken]
@@ -229,9 +232,9 @@ class RecorderNode(BaseNode):
         return sum(steps + 1 - self._bag.counts[topic.name] for topic in topics)
 
     def conclude(self) -> None:
-        """Close the topics, then the bag."""
-        self.close()
+        """Close the bag with what has come; the topics can wait, and the middleware may hang."""
         if self._bag is not None:
+            self._take()
             try:
                 self._bag.close()
             except BagError as error:

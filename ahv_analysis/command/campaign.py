@@ -25,7 +25,7 @@ from ahv_analysis.command.console import (
     progress_bar,
     show_table,
 )
-from ahv_analysis.interrupt import interrupted_says, signals_wait
+from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
 
@@ -196,7 +196,7 @@ def rerun(
                 check_domain()
                 from ahv_analysis.flight.one_process import fly_graph
 
-                ended_early, _ = fly_graph(case, bag, progress=progress)
+                ended_early, _ = fly_graph(case, bag, progress=progress, leave=last_of_all)
             else:
                 ended_early, _ = fly_library(case, bag, progress=progress)
         result |= {"bag": str(bag), "ended_early": ended_early}

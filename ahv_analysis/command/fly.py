@@ -25,7 +25,7 @@ from ahv_analysis.command.console import (
     show_table,
 )
 from ahv_analysis.errors import BagError, GraphError
-from ahv_analysis.interrupt import interrupted_says, signals_wait
+from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_msgs_py.node.network import DISCOVERY_RANGE
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP, STEP_NS
@@ -158,7 +158,7 @@ def _engine(processes: bool) -> Callable[..., tuple[str, float]]:
     from ahv_analysis.flight.one_process import fly_graph
     from ahv_analysis.flight.process_per_node import fly_processes
 
-    return fly_processes if processes else fly_graph
+    return fly_processes if processes else partial(fly_graph, leave=last_of_all)
 
 
 def _dispersion(choice: str | None, seed: int, run: int) -> tuple[dict[str, object], Any]:

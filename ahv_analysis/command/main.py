@@ -4,7 +4,7 @@
 import os
 import sys
 
-from ahv_analysis.interrupt import end_on_signals, let_no_signal_end
+from ahv_analysis.interrupt import do_the_last, end_on_signals, let_no_signal_end
 
 
 def main() -> None:
@@ -15,6 +15,10 @@ def main() -> None:
 
     try:
         app()
+    except SystemExit as end:
+        let_no_signal_end()
+        do_the_last(int(end.code or 0))
+        raise
     finally:
         let_no_signal_end()
 

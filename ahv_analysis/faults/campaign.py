@@ -4,9 +4,11 @@
 import json
 import math
 import signal
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
@@ -24,22 +26,24 @@ from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.faults.faulty_node import INJECT, faulty
 from ahv_analysis.faults.whole_flights import fly_with, whole_flight_faults
 from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.one_process import Leave, at_once
 from ahv_analysis.flight.process_per_node import (
     LONGEST_START,
     NodeChange,
     ProcessGraph,
 )
-from ahv_analysis.flight.watcher import Watcher
+from ahv_analysis.flight.watcher import LOOK, Watcher
 from ahv_analysis.interrupt import signals_wait
 from ahv_analysis.report.page import render
 from ahv_analysis.report.page_flight import read_flights
 from ahv_analysis.report.summary import summarize
-from ahv_msgs_py.graph import controllers, listeners
+from ahv_msgs_py.graph import NODES, controllers, listeners
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.network import keep_to_this_machine
-from ahv_msgs_py.node.quality import quality
+from ahv_msgs_py.node.quality import newest, quality
+from ahv_msgs_py.node.subscription import gids
 from ahv_msgs_py.topics import (
     BY_NAME,
     DIAGNOSTICS,
@@ -61,6 +65,8 @@ LEAD = 2.0  # [s] of undisturbed flight
 LONGEST_OUTAGE = 1.0  # [s] of a node
 LONGEST_LOSS = 0.5  # [s] of a bag whose recorder was killed
 SETTLE = 1.0  # [s] after an injection, in which it must be noticed
+HEARD_AGAIN = 0.6  # [s] of flight in which a node is, that goes on or has joined the graph again
+LONGEST_SILENCE = 5.0  # [s] for which that is waited for
 PER_FLIGHT = 75  # injections, so that a flight stays within its 150 s
 CONTROLLERS = tuple(controllers(adaptive=True))
 RECEIVED = tuple(topic.name for name, topic in BY_NAME.items() if listeners(name))
@@ -99,6 +105,7 @@ class Injection(NamedTuple):
     noticed: str  # the first report that was expected, by whom; empty if there was none
     latency: float | None  # [s] of simulated time until then
     max_abs_alpha: float  # [deg] until the next one
+    silence: float | None = None  # [s] of flight until a node that was let go was heard again
 
 
 def draw_injections(random: Random, count: int) -> Iterator[tuple[str, str, float]]:
@@ -153,18 +160,72 @@ class Spectator(Liar):
     """Sees the states, and can speak where it should not."""
 
     def __init__(self, interrupted: Callable[[], bool] = lambda: False):
-        """Listen to the state as well."""
+        """Be ready to look on."""
         super().__init__(interrupted)
-        message_type = message_class(STATE.layout.type_name)
-        self._node.create_subscription(
-            message_type, STATE.name, self._see, quality(durable=False, depth=10), raw=True
-        )
         self._orders = self._node.create_publisher(String, INJECT, quality(durable=False))
         self._voices: dict[str, Any] = {}
         self._speaking: LoopTopic | None = None
         self.state: State | None = None
         self.stamp = 0  # [ns]
         self.max_abs_alpha = 0.0  # [rad] since it was last reset
+        self._let_go = 0  # [ns] flight time when a node was let go
+        self._heard: dict[
+            str, int
+        ] = {}  # [ns] the first command of a topic that answers a later state
+
+    @contextmanager
+    def looking_on(self, interrupted: Callable[[], bool] = lambda: False) -> Iterator[None]:
+        """See one flight, by a listener that its plant waits for; no look once `interrupted()`."""
+        takes: dict[LoopTopic, Callable[[bytes], None]] = {STATE: self._see}
+        takes |= {
+            BY_NAME[name]: partial(self._hear, name)
+            for node in CONTROLLERS
+            for name in NODES[node].sends
+        }
+        subscriptions = [
+            self._node.create_subscription(
+                message_class(topic.layout.type_name), topic.name, take, newest(), raw=True
+            )
+            for topic, take in takes.items()
+        ]
+        self.look(LOOK)  # what was still under way of the flight before
+        self.state, self.stamp, self._interrupted = None, 0, interrupted
+        try:
+            yield
+        finally:
+            self._interrupted = lambda: False
+            for subscription in subscriptions:
+                self._node.destroy_subscription(subscription)
+
+    def _hear(self, name: str, data: bytes) -> None:
+        known = BY_NAME[name].layout.decode(data)
+        if known is not None and known[0] > self._let_go:
+            self._heard.setdefault(name, known[0])
+
+    def wait_for_another(self, node: str, start: Callable[[], None]) -> None:
+        """Start a node, and wait until it is known in the graph."""
+        topic = BY_NAME[NODES[node].sends[-1]].name
+        before = {*gids(self._node, topic)}
+        start()
+        until = time.monotonic() + LONGEST_START
+        while {*gids(self._node, topic)} <= before and time.monotonic() < until:
+            self.look(0.02)
+
+    def let_go(self) -> None:
+        """Wait from now on for commands that answer states to come."""
+        self._let_go, self._heard = self.stamp, {}
+
+    def silence(self, node: str) -> float:
+        """Seconds of flight from when a node was let go to its first answer, on all its topics.
+
+        That of the plant is the answer to its states.
+        """
+        topics = NODES[node].hears if node == "plant" else NODES[node].sends
+        until = time.monotonic() + LONGEST_SILENCE
+        while not self._heard.keys() >= {*topics} and time.monotonic() < until:
+            self.look(0.1)
+        heard = [self._heard.get(topic, self.stamp) for topic in topics]
+        return (max(heard) - self._let_go) * 1e-9
 
     def _see(self, data: bytes) -> None:
         known = STATE.layout.decode(data)
@@ -214,11 +275,30 @@ def run_campaign(
     out: Path,
     progress: Callable[[int], None] = lambda done: None,
     whole_flights: bool = True,
+    leave: Leave = at_once,
 ) -> dict[str, Any]:
     """Fly and disturb until so many faults were injected; bags and `faults.json` go to `out`.
 
     Then the faults that decide how a flight ends, with `whole_flights`: half a minute each.
+    `leave` is given what ends the looking on, as that of a flight.
     """
+    keep_to_this_machine()
+    log_where_it_can()
+    spectator = Spectator()
+    try:
+        return _run_campaign(spectator, injections, seed, out, progress, whole_flights)
+    finally:
+        leave(spectator.close)
+
+
+def _run_campaign(
+    spectator: Spectator,
+    injections: int,
+    seed: int,
+    out: Path,
+    progress: Callable[[int], None],
+    whole_flights: bool,
+) -> dict[str, Any]:
     random = Random(seed)
     done: list[Injection] = []
     flights: list[dict[str, Any]] = []
@@ -228,15 +308,16 @@ def run_campaign(
         bag = out / f"bag-{len(flights)}"
         before = len(done)
         flight = _disturbed_flight(
+            spectator,
             list(draw_injections(random, count)),
             bag,
             done,
             lambda: progress(len(done)),
         )
         flights.append(flight | _judge_bag(bag, done[before:]))
-    flights.append(_bereaved_flight(out / "bag-of-a-killed-recorder", done))
+    flights.append(_bereaved_flight(spectator, out / "bag-of-a-killed-recorder", done))
     if whole_flights:
-        done += _whole_flights(out)
+        done += _whole_flights(spectator, out)
     report = _report(done, flights, seed)
     (out / "faults.json").write_text(json.dumps(report, indent=1, allow_nan=False) + "\n")
     return report
@@ -244,26 +325,20 @@ def run_campaign(
 
 @contextmanager
 def _watched_flight(
-    bag: Path, change: NodeChange | None = None
-) -> Iterator[tuple[Spectator, ProcessGraph]]:
+    spectator: Spectator, bag: Path, change: NodeChange | None = None
+) -> Iterator[ProcessGraph]:
     """Fly while somebody looks on; a signal ends it in order, and the looks at once."""
-    keep_to_this_machine()
-    log_where_it_can()
     case = load_case(CASE, {"duration": 3600.0})
     graph = ProcessGraph(case, bag, realtime=True, spectators=1, change=change)
-    with signals_wait() as interrupted:
-        spectator = Spectator(interrupted)
-        try:
-            with graph:
-                _wait_for_flight(spectator)
-                spectator.look(LEAD)
-                yield spectator, graph
-                graph.end_flight()
-        finally:
-            spectator.close()
+    with signals_wait() as interrupted, spectator.looking_on(interrupted), graph:
+        _wait_for_flight(spectator)
+        spectator.look(LEAD)
+        yield graph
+        graph.end_flight()
 
 
 def _disturbed_flight(
+    spectator: Spectator,
     plan: list[tuple[str, str, float]],
     bag: Path,
     done: list[Injection],
@@ -271,7 +346,7 @@ def _disturbed_flight(
 ) -> dict[str, Any]:
     """One flight with the injections of a plan."""
     unexpected: list[str] = []
-    with _watched_flight(bag, faulty) as (spectator, graph):
+    with _watched_flight(spectator, bag, faulty) as graph:
         for kind, target, length in plan:
             done.append(_inject(spectator, graph, kind, target, length))
             unexpected += [f"{name}: {code}" for name, code in graph.ended().items()]
@@ -279,9 +354,9 @@ def _disturbed_flight(
     return {"steps": spectator.stamp // STEP_NS, "unexpected_ends": unexpected}
 
 
-def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
+def _bereaved_flight(spectator: Spectator, bag: Path, done: list[Injection]) -> dict[str, Any]:
     """One flight that loses its recorder, and then its plant, and gets a new one."""
-    with _watched_flight(bag) as (spectator, graph):
+    with _watched_flight(spectator, bag) as graph:
         killed = spectator.stamp
         graph.kill("recorder")
         spectator.look(SETTLE)
@@ -321,18 +396,13 @@ def _bereaved_flight(bag: Path, done: list[Injection]) -> dict[str, Any]:
     }
 
 
-def _whole_flights(out: Path) -> Iterator[Injection]:
+def _whole_flights(liar: Liar, out: Path) -> Iterator[Injection]:
     """Flights by the command, one for each fault that decides how a flight ends."""
-    keep_to_this_machine()
-    liar = Liar()
-    try:
-        for fault in whole_flight_faults(liar.end):
-            liar.step = -1
-            end = fly_with(fault, out / fault.kind.replace(" ", "-"), liar)
-            time = max(0, liar.step) * STEP_NS * 1e-9
-            yield Injection(fault.kind, fault.target, time, 0.0, end.words, 0.0, end.max_abs_alpha)
-    finally:
-        liar.close()
+    for fault in whole_flight_faults(liar.end):
+        liar.step = -1
+        end = fly_with(fault, out / fault.kind.replace(" ", "-"), liar)
+        since = max(0, liar.step) * STEP_NS * 1e-9
+        yield Injection(fault.kind, fault.target, since, 0.0, end.words, 0.0, end.max_abs_alpha)
 
 
 def _wait_for_flight(spectator: Spectator) -> None:
@@ -354,13 +424,15 @@ def _inject(
     if kind == "killed":
         graph.kill(target)
         spectator.look(length)
-        graph.start(target)
+        spectator.wait_for_another(target, lambda: graph.start(target))
+        spectator.let_go()
         spectator.look(1.0)
     elif kind == "stopped":
         length = max(length, 0.05)
         graph.signal(target, signal.SIGSTOP)
         spectator.look(length)
         graph.signal(target, signal.SIGCONT)
+        spectator.let_go()
     elif kind == "use_sim_time":
         noticed = "" if spectator.use_sim_time(target) else f"{target}: refused"
     elif kind == "foreign diagnostic":
@@ -375,6 +447,7 @@ def _inject(
     spectator.look(SETTLE)
     if kind == "foreign diagnostic" and spectator.stamp - settled > 0.5 * SETTLE * 1e9:
         noticed = "the flight goes on"
+    silence = spectator.silence(target) if kind in ("killed", "stopped") else None
     if noticed:
         latency = (settled - start) * 1e-9
     names = {fault.name.lower().replace("_", " ") for fault in EXPECTED.get(kind, ())}
@@ -390,6 +463,7 @@ def _inject(
         noticed,
         latency,
         spectator.max_abs_alpha * DEGREES,
+        silence,
     )
 
 
@@ -439,16 +513,24 @@ def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> 
         of_kind = [entry for entry in done if entry.kind == kind]
         if of_kind:
             latencies = [entry.latency for entry in of_kind if entry.latency is not None]
+            silences = [entry.silence for entry in of_kind if entry.silence is not None]
             kinds[kind] = {
                 "injected": len(of_kind),
                 "noticed": sum(bool(entry.noticed) for entry in of_kind),
                 "latency_s_max": max(latencies, default=None),
                 "max_abs_alpha_deg": max(entry.max_abs_alpha for entry in of_kind),
+                "silence_s_max": max(silences, default=None),
             }
     unnoticed = [entry._asdict() for entry in done if not entry.noticed]
+    deaf = [
+        entry._asdict()
+        for entry in done
+        if entry.silence is not None and entry.silence > HEARD_AGAIN
+    ]
     passed = (
         alpha <= UNSTART_ALPHA * DEGREES
         and not unnoticed
+        and not deaf
         and all(flight.get("lost_with_the_recorder_s", 0.0) < LONGEST_LOSS for flight in flights)
         and all(
             not (flight["unexpected_ends"] or flight["not_finite"] or flight["unreadable"])
@@ -462,6 +544,7 @@ def _report(done: list[Injection], flights: list[dict[str, Any]], seed: int) -> 
         "passed": passed,
         "max_abs_alpha_deg": alpha,
         "unnoticed": unnoticed,
+        "deaf": deaf,
         "kinds": kinds,
         "flights": flights,
         "log": [entry._asdict() for entry in done],

@@ -6,6 +6,7 @@ import os
 from ahv_analysis.versions import source_hash
 from ahv_msgs_py.node.warm_up import warm_up_nodes
 
+SERVER = os.getpid()
 SOURCE = source_hash()  # of the code that every process forked off here runs
 
 warm_up_nodes()

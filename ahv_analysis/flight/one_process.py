@@ -3,6 +3,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import rclpy
@@ -26,6 +27,12 @@ from ahv_plant.plant_node import PlantNode
 
 LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
 LOOK = 0.2  # [s] of wall time between looks at the progress
+Leave = Callable[[Callable[[], None]], object]  # calls what it is given, now or when all is said
+
+
+def at_once(leave: Callable[[], None]) -> None:
+    """Leave the graph as soon as it is flown."""
+    leave()
 
 
 def loop_topics(case: Case) -> Sequence[LoopTopic]:
@@ -42,6 +49,7 @@ def fly_graph(
     realtime: bool = False,
     on_error: str = STOP,
     progress: Callable[[int], None] = lambda steps: None,
+    leave: Leave = at_once,
 ) -> tuple[str, float]:
     """Fly `case` on a graph of its own context; record to `bag` unless that is None.
 
@@ -51,11 +59,14 @@ def fly_graph(
     first state to the last command. Raises ParameterError for settings that a node refuses,
     GraphError if the graph stops and BagError if the disk fails; with `on_error` CONTINUE the
     flight goes on without a record then. A signal ends the flight in order: it has its effect once
-    the bag is whole and the graph is gone.
+    the bag is whole and the graph is gone. Fast DDS can wait for itself for ever when a graph is
+    left: `leave` is given what does that, to be called within a deadline.
     """
     warm_up_nodes(("plant", *case.controllers))
     with signals_wait() as interrupted:
-        return _fly_graph(case, bag, domain, namespace, realtime, on_error, progress, interrupted)
+        return _fly_graph(
+            case, bag, domain, namespace, realtime, on_error, progress, leave, interrupted
+        )
 
 
 def _fly_graph(
@@ -66,6 +77,7 @@ def _fly_graph(
     realtime: bool,
     on_error: str,
     progress: Callable[[int], None],
+    leave: Leave,
     interrupted: Callable[[], bool],
 ) -> tuple[str, float]:
     keep_to_this_machine()
@@ -111,13 +123,17 @@ def _fly_graph(
         for node in nodes:
             executor.remove_node(node)
             node.conclude()
-        executor.shutdown()
-        for node in reversed(nodes):
-            node.destroy_node()
-        rclpy.shutdown(context=context)
+        leave(partial(_leave, context, executor, nodes))
     if recorder is not None and recorder.failure is not None and on_error == STOP:
         raise recorder.failure
     return plant.finished.result(), wall
+
+
+def _leave(context: rclpy.Context, executor: EventsExecutor, nodes: list[BaseNode]) -> None:
+    executor.shutdown()
+    for node in reversed(nodes):
+        node.destroy_node()
+    rclpy.shutdown(context=context)
 
 
 def _spin(

@@ -19,10 +19,12 @@ import rclpy
 from ahv_analysis.errors import GraphError
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.library import INTERRUPTED
+from ahv_analysis.flight.shared_memory import pieces, remove_abandoned
 from ahv_analysis.interrupt import SIGNALS, signals_wait
 from ahv_analysis.versions import source_hash
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.deadline import end_with_parent
 from ahv_msgs_py.node.log_folder import log_where_it_can
 from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.network import keep_to_this_machine
@@ -36,7 +38,10 @@ NodeChange = Callable[[type[BaseNode]], type[BaseNode]]  # goes to the processes
 
 LONGEST_START = 30.0  # [s] until the first state
 LONGEST_SILENCE = 10.0  # [s] without a sign of the plant, after which the graph has failed
-LONGEST_END = 10.0  # [s] for a process to end by itself
+LONGEST_REST = (
+    6.0  # [s] from the end of a flight until plant and recorder have ended by themselves
+)
+LONGEST_END = 8.0  # [s] from there until the last process has been killed
 LOOK = 0.05  # [s] between looks at the processes, and of the plant at its progress
 
 
@@ -84,8 +89,12 @@ def _run_node(
 
     It has to run the code of `source`, which is filed with the flight.
     """
-    from ahv_analysis.flight.node_server import SOURCE  # loaded by the server; compiles all laws
+    # loaded by the server; compiles all laws
+    from ahv_analysis.flight.node_server import SERVER, SOURCE
 
+    # The server ends when the last one who may ask it for processes has: that is its client alone.
+    os.close(forkserver._forkserver._forkserver_alive_fd)  # type: ignore[attr-defined]
+    end_with_parent(SERVER)
     if source != SOURCE:
         print(f"{name}: the code in {Path(__file__).parents[2]} has changed", file=sys.stderr)
         sys.exit(2)
@@ -147,6 +156,7 @@ class ProcessGraph:
         self.values |= {name: case.parameters[name] | mode for name in self.controllers}
         self.values["plant"] = case.parameters["plant"] | mode | {"listeners": listeners}
         self.processes: dict[str, BaseProcess] = {}
+        self._pieces = pieces()
         self._context = multiprocessing.get_context("forkserver")
         os.environ[SAFE_PATH] = "1"  # or the server imports what lies in the working directory
         self.report = FlightReport(self._context)
@@ -220,20 +230,25 @@ class ProcessGraph:
         trace: TracebackType | None,
     ) -> None:
         """Let plant and recorder finish, interrupt the others, kill what does not hear."""
+        begun = time.monotonic()
+
+        def left(longest: float) -> float:
+            return max(0.0, begun + longest - time.monotonic())
+
         if error is None:
             for name in ("plant", "recorder"):  # end by themselves when all is said
                 if name in self.processes:
-                    self.processes[name].join(LONGEST_END)
+                    self.processes[name].join(left(LONGEST_REST))
         for name, process in self.processes.items():
             if process.exitcode is None:
                 self.signal(name, signal.SIGCONT)
                 self.signal(name, signal.SIGINT)
-        deadline = time.monotonic() + LONGEST_END
         for process in self.processes.values():
-            process.join(max(0.1, deadline - time.monotonic()))
+            process.join(left(LONGEST_END))
             if process.exitcode is None:
                 process.kill()
                 process.join()
+        remove_abandoned(pieces() - self._pieces)
 
 
 def fly_processes(

@@ -3,9 +3,11 @@
 
 import ctypes
 import os
+import signal
 from time import CLOCK_MONOTONIC
 
 _CALL_IN_A_THREAD = 2  # SIGEV_THREAD
+_SIGNAL_OF_PARENT = 1  # PR_SET_PDEATHSIG
 
 
 class _Event(ctypes.Structure):
@@ -38,3 +40,12 @@ def end_within(seconds: float, code: int) -> None:
         libc.timer_settime(timer, 0, once, None)
     ):
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+
+
+def end_with_parent(parent: int) -> None:
+    """Have this process sent SIGTERM when process `parent`, which made it, ends in any way."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(_SIGNAL_OF_PARENT, int(signal.SIGTERM)):
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    if os.getppid() != parent:  # it has ended already
+        signal.raise_signal(signal.SIGTERM)

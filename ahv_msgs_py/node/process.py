@@ -3,7 +3,6 @@
 
 import signal
 import sys
-import threading
 from collections.abc import Callable
 
 import rclpy
@@ -32,9 +31,11 @@ def run(node_class: Callable[[], BaseNode]) -> None:
     It configures and activates itself; with `autostart` false the lifecycle services do that.
     """
     keep_to_this_machine()
-    stop = threading.Event()
-    for number in SIGNALS:  # never in the middle of a message, and a second one changes nothing
-        signal.signal(number, lambda *_: stop.set())
+    came: list[int] = []
+    # Never in the middle of a message, and a second one changes nothing, nor does it wait for the
+    # first, as it would for a lock: it may come while that is being answered.
+    for number in SIGNALS:
+        signal.signal(number, lambda number, _: came.append(number))
     try:
         log_where_it_can()
         given_files(sys.argv)
@@ -52,7 +53,7 @@ def run(node_class: Callable[[], BaseNode]) -> None:
             take_precedence()
         if node.refusal or node.settings[AUTOSTART.name]:
             node.bring_up()
-        while not (node.finished.done() or stop.is_set()):
+        while not (node.finished.done() or came):
             executor.spin_until_future_complete(node.finished, LOOK)
         # what was begun is ended, or the executor holds the node and all that it has of DDS
         executor.spin_until_future_complete(Future(executor=None), SETTLE)
