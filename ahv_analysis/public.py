@@ -19,7 +19,7 @@ from pyarrow.parquet import read_table
 
 from ahv_analysis.bag.dataset import bag_dataset, flight_dataset
 from ahv_analysis.bag.notes import NOTES, read_notes
-from ahv_analysis.bag.record import FlightRecord, record
+from ahv_analysis.bag.record import FlightRecord, record_of
 from ahv_analysis.campaign import campaign as campaigns
 from ahv_analysis.campaign.store import level_folder, part_files
 from ahv_analysis.flight.case import (
@@ -83,7 +83,7 @@ def fly(
         changes["duration"] = duration
     flown = load_case(case, changes, draw)
     steps = list(fly_steps(flown))
-    return Flight(flown, record(steps, flown.plant.truth.geometric), steps[-1].ended_early)
+    return Flight(flown, record_of(steps, flown.plant.truth.geometric), steps[-1].ended_early)
 
 
 def fly_campaign(

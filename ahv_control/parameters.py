@@ -93,32 +93,32 @@ VELOCITY_PARAMETERS = (
     GEOMETRIC_ALTITUDE,
 )
 
-Values = Mapping[str, Value]
+ParameterValues = Mapping[str, Value]
 
 
-def outer_loop(values: Values) -> OuterLoop:
+def outer_loop(values: ParameterValues) -> OuterLoop:
     """Outer-loop settings from checked parameters."""
     return OuterLoop(
         float(values["altitude"]), float(values["k_h"]), float(values["alpha_limit"]) * RADIANS
     )
 
 
-def intermediate_loop(values: Values) -> IntermediateLoop:
+def intermediate_loop(values: ParameterValues) -> IntermediateLoop:
     """Intermediate-loop settings from checked parameters."""
     return IntermediateLoop(*(float(values[name]) for name in IntermediateLoop._fields))
 
 
-def _rates(values: Values, prefix: str, scale: float = 1.0) -> Rates:
+def _rates(values: ParameterValues, prefix: str, scale: float = 1.0) -> Rates:
     return Rates(*(float(values[f"{prefix}_{rate}"]) * scale for rate in "PQR"))
 
 
-def _error_dynamics(values: Values, prefix: str) -> ErrorDynamics:
+def _error_dynamics(values: ParameterValues, prefix: str) -> ErrorDynamics:
     """Error dynamics with the gains of a prefix; the bounds and the exponent are shared."""
     bound = _rates(values, "k_s", RADIANS)
     return ErrorDynamics(_rates(values, prefix), bound, float(values["lambda"]))
 
 
-def inner_loop(values: Values) -> InnerLoop:
+def inner_loop(values: ParameterValues) -> InnerLoop:
     """Inner-loop settings from checked parameters."""
     return InnerLoop(
         _error_dynamics(values, "k"),
@@ -128,7 +128,7 @@ def inner_loop(values: Values) -> InnerLoop:
     )
 
 
-def learner_settings(values: Values) -> LearnerSettings:
+def learner_settings(values: ParameterValues) -> LearnerSettings:
     """Disturbance-learner settings from checked parameters."""
     return LearnerSettings(
         _error_dynamics(values, "k"),
@@ -141,7 +141,7 @@ def learner_settings(values: Values) -> LearnerSettings:
     )
 
 
-def velocity_loop(values: Values) -> VelocityLoop:
+def velocity_loop(values: ParameterValues) -> VelocityLoop:
     """Velocity-loop settings from checked parameters."""
     return VelocityLoop(
         float(values["speed"]), float(values["k_u"]), bool(values["geometric_altitude"])

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from matplotlib import pyplot
 
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.closed_loop import Loop, loop_step, start_loop
 from ahv_analysis.flight.library import fly
@@ -246,7 +246,7 @@ def draw_learning(path: Path) -> None:
         figure, axes = pyplot.subplots(2, len(KINDS), sharex=True, figsize=(9.6, 4.2))
         for column, (kind, changes) in zip(axes.T, KINDS.items(), strict=True):
             case = load_case("neuro_adaptive_di", undispersed | start | changes)
-            flight = record(fly(case), False)
+            flight = record_of(fly(case), False)
             assert flight.estimates is not None
             rates = flight.states[:, 3:6]
             true = [

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.campaign.campaign import RUNS_PER_JOB, Campaign, fly_runs
 from ahv_analysis.campaign.store import Columns
 from ahv_analysis.campaign.summary import exact_interval
@@ -116,7 +116,7 @@ def study_protection() -> None:
         chosen = changed(case, changes)
         lost = failed_runs(Campaign(chosen, LEVEL, RUNS, SEED))
         undispersed = {f"dispersion.{name}": 1.0 for name in Dispersion._fields}
-        nominal = record(fly(changed(chosen, {"plant": undispersed})), False)
+        nominal = record_of(fly(changed(chosen, {"plant": undispersed})), False)
         alpha, h = nominal.air.alpha * DEGREES, nominal.column("h")
         row(
             name,

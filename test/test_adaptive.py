@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.flight.case import dispersion_parameters, load_case
 from ahv_analysis.flight.library import fly
 from ahv_control.error_dynamics import ErrorDynamics, decay, error_decay
@@ -35,7 +35,7 @@ ADAPTIVE = ["neuro_adaptive_di", "neuro_adaptive_sc_gdi"]
 def flown(name, plant=None):
     case = load_case(name, plant)
     steps = list(fly(case))
-    return record(steps, False), steps[-1].ended_early, steps
+    return record_of(steps, False), steps[-1].ended_early, steps
 
 
 @given(RATES, RATES, POSITIVE, BOUNDS)
@@ -191,7 +191,7 @@ def test_a_cautious_start_saves_a_vehicle_that_pitches_up(name):
     case = load_case(name, pitching)
     learner = case.control.learner._replace(first_estimate=0.0)
     rash = case._replace(control=case.control._replace(learner=learner))
-    assert not record(fly(rash), False).inlet_started
+    assert not record_of(fly(rash), False).inlet_started
     flight, ended_early, _ = flown(name, pitching)
     assert not ended_early and flight.inlet_started
     assert np.max(flight.air.alpha) * DEGREES < 4.0
@@ -200,7 +200,7 @@ def test_a_cautious_start_saves_a_vehicle_that_pitches_up(name):
 @pytest.mark.parametrize("name", PROTECTED)
 def test_a_cautious_start_moves_a_nominal_vehicle_little(name):
     case = load_case(name, {f"dispersion.{key}": 1.0 for key in HARD} | {"duration": 60.0})
-    flight = record(fly(case), False)
+    flight = record_of(fly(case), False)
     alpha = flight.air.alpha * DEGREES
     assert alpha.min() > 2.6 and alpha.max() < 3.1
     assert np.max(np.abs(flight.column("h") - 24000.0)) < 100.0

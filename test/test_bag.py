@@ -13,7 +13,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StorageP
 from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag.reader import flight_of, load_bag, read, read_bag
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.errors import BagError
 from ahv_analysis.flight.case import load_case
@@ -34,7 +34,7 @@ def whole(tmp_path_factory):
 
 def test_a_library_bag_gives_the_flight_back(whole):
     case = load_case("nominal_di", {"duration": 1.0})
-    flown, computed = read_bag(whole), record(fly(case), False)
+    flown, computed = read_bag(whole), record_of(fly(case), False)
     for name in ("stamps", "states", "attitude_commands", "rate_commands", "surfaces", "throttle"):
         assert np.array_equal(getattr(flown, name), getattr(computed, name)), name
 

@@ -15,7 +15,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
 from ahv_analysis.bag.reader import flight_of, read, read_bag
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.bag.recorder_node import CONTINUE, RecorderNode
 from ahv_analysis.bag.recovery import recover
 from ahv_analysis.bag.writer import BagWriter
@@ -89,7 +89,7 @@ def test_killed_recorders_leave_bags_that_recover(tmp_path, domain):
     draw = random.Random(5)
     moments = [draw.uniform(0.3, 1.5) for _ in range(3)]
     case = load_case("nominal_di", {"duration": 150.0})
-    flown = record(fly(case), False)
+    flown = record_of(fly(case), False)
     for kill in kill_recorders(tmp_path, moments, domain):
         bag = read(kill.recovered)
         assert bag.notes.planned == 150.0 and "versions" in bag.notes.content
@@ -118,7 +118,7 @@ def check_what_is_left(bag, error):
         read_bag(bag)
     resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     recover(bag, bag.with_name("new"))
-    kept, flown = read_bag(bag.with_name("new")), record(fly(load_case("nominal_di")), False)
+    kept, flown = read_bag(bag.with_name("new")), record_of(fly(load_case("nominal_di")), False)
     assert 0 < kept.steps < flown.steps
     assert kept.states.tobytes() == flown.states[: kept.steps + 1].tobytes()
 

@@ -10,7 +10,7 @@ import pytest
 from catkin_pkg.package import parse_package
 
 from ahv_analysis.bag.reader import read_bag
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
 from test.documents import ROOT, run_in_terminals
@@ -34,7 +34,7 @@ def test_an_inner_loop_of_ones_own_flies_the_plant_as_well_as_ours(tmp_path, dom
     run_in_terminals(terminals, tmp_path, environment)
     flown = read_bag(tmp_path / "bag")
     assert flown.steps == DURATION * 100
-    ours = record(fly(load_case("nominal_di", {"duration": DURATION})), False)
+    ours = record_of(fly(load_case("nominal_di", {"duration": DURATION})), False)
     largest, of_ours = (np.degrees(np.max(np.abs(f.air.alpha))) for f in (flown, ours))
     assert largest == pytest.approx(of_ours, abs=0.1)
     assert largest != of_ours, "that was not the example's law"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot
 
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
 from ahv_analysis.report.figures import CHAPTER_3, FLOWN, TUMBLING, draw
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.unit
 
 def test_a_flight_that_is_lost_is_drawn_until_it_tumbles():
     """What its numbers come to afterwards, 1e19 here, would hide all that went before."""
-    flight = record(fly(load_case("nominal_di_dispersed")), False)
+    flight = record_of(fly(load_case("nominal_di_dispersed")), False)
     assert np.max(np.abs(flight.states)) > 1e15
     figure = draw(CHAPTER_3[0], {FLOWN: flight})
     for axis in figure.axes:

@@ -12,7 +12,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from ahv_analysis.bag.reader import read_bag
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import case_names, load_case
 from ahv_analysis.flight.library import fly, fly_library
@@ -40,7 +40,7 @@ def same_bits(one, other):
 
 def test_graph_and_library_agree_to_the_last_bit(nominal):
     case = load_case("nominal_di")
-    flown, computed = read_bag(nominal), record(fly(case), case.plant.truth.geometric)
+    flown, computed = read_bag(nominal), record_of(fly(case), case.plant.truth.geometric)
     assert flown.steps == STEPS
     for name in ARRAYS:
         assert same_bits(getattr(flown, name), getattr(computed, name)), name
@@ -50,7 +50,7 @@ def test_graph_and_library_agree_to_the_last_bit(nominal):
 def test_every_case_flies_on_the_graph_as_in_the_library(name, tmp_path, domain):
     case = load_case(name, {"duration": 20.0})
     ended_early, _ = fly_graph(case, tmp_path / "bag", domain=domain)
-    flown, computed = read_bag(tmp_path / "bag"), record(fly(case), False)
+    flown, computed = read_bag(tmp_path / "bag"), record_of(fly(case), False)
     assert bool(ended_early) == (flown.steps < case.plant.steps)
     for array in ARRAYS:
         assert same_bits(getattr(flown, array), getattr(computed, array)), array

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.campaign.batch import (
     LIKE,
     fly_alone,
@@ -167,7 +167,7 @@ def test_an_outcome_is_the_same_alone_and_in_a_lane_and_true_of_the_flight(name)
         alone = fly_alone(one.plant.initial, one.plant.truth, one.control, one.plant.steps)
         assert same_bits(alone, outcomes[run]), run
     one = campaign.case_of(7)
-    flown, outcome = record(fly(one), False), Outcome(*outcomes[7])
+    flown, outcome = record_of(fly(one), False), Outcome(*outcomes[7])
     until = slice(int(outcome.steps))
     assert outcome.max_abs_alpha == pytest.approx(
         np.max(np.abs(flown.air.alpha[: int(outcome.steps) + 1])), rel=1e-12
@@ -204,7 +204,7 @@ def test_a_broken_lane_fails_with_its_cause_and_touches_no_other(change, cause):
 
 def test_a_trajectory_to_draw_is_that_of_the_flight():
     case = load_case("neuro_adaptive_di", {"duration": 5.0})
-    kept, flown = fly_trajectory(case, 10), record(fly(case), False)
+    kept, flown = fly_trajectory(case, 10), record_of(fly(case), False)
     assert np.array_equal(kept.stamps, flown.stamps[::10])
     for name in ("states", "attitude_commands", "rate_commands", "surfaces", "throttle"):
         assert same_bits(getattr(kept, name), getattr(flown, name)[::10]), name

@@ -17,7 +17,7 @@ import pytest
 from rclpy.qos import ReliabilityPolicy
 
 from ahv_analysis.bag.reader import read_bag
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.errors import GraphError
 from ahv_analysis.faults.campaign import (
     CONTROLLERS,
@@ -69,7 +69,7 @@ def test_processes_in_lockstep_fly_the_same_bits_and_leave_nothing(tmp_path, dom
     ended_early, _ = fly_processes(case, tmp_path / "bag")
     assert ended_early == ""
     assert shared_memory(domain) <= before
-    flown, computed = read_bag(tmp_path / "bag"), record(fly(case), False)
+    flown, computed = read_bag(tmp_path / "bag"), record_of(fly(case), False)
     for name in ("stamps", "states", "surfaces", "throttle", "learner", "estimates"):
         assert np.array_equal(getattr(flown, name), getattr(computed, name)), name
 
@@ -125,7 +125,7 @@ def node_pids():
 
 def reference(seconds):
     """The flight that nothing disturbs."""
-    return record(fly(load_case(CASE, {"duration": seconds})), False)
+    return record_of(fly(load_case(CASE, {"duration": seconds})), False)
 
 
 def away(spectator, calm):

@@ -6,7 +6,7 @@ import pytest
 
 from ahv_analysis import quantities
 from ahv_analysis.bag.dataset import flight_dataset
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
 from ahv_analysis.quantities import BY_NAME, QUANTITIES, SCALES, Quantity
@@ -34,7 +34,7 @@ LOAD = Quantity(
 @pytest.fixture(scope="module")
 def flight():
     case = load_case("neuro_adaptive_di", {"duration": 0.1})
-    return record(fly(case), False), case
+    return record_of(fly(case), False), case
 
 
 def test_names_are_told_apart_and_units_are_known():

@@ -14,13 +14,13 @@ from playwright.sync_api import sync_playwright
 from typer.testing import CliRunner
 
 from ahv_analysis.bag.reader import read_bag
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.command.app import app
 from ahv_analysis.flight.case import Draw, load_case
 from ahv_analysis.flight.library import fly, fly_library, write_step
 from ahv_analysis.report.metrics import (
-    held,
+    integral,
     margin,
     margins,
     measure,
@@ -91,7 +91,7 @@ def test_effort_and_travel_of_a_triangle():
 def test_a_command_counts_until_the_next_one_and_the_last_not_at_all():
     time, command = np.array([0.0, 1.0, 3.0, 3.5]), np.array([0.9, 0.1, 0.5, 0.9])
     assert use(time, command, (0.1, 0.9)).saturated_s == 1.0 + 2.0
-    assert held(time, command) == pytest.approx(0.9 + 2 * 0.1 + 0.5 * 0.5)
+    assert integral(time, command) == pytest.approx(0.9 + 2 * 0.1 + 0.5 * 0.5)
 
 
 def test_margin_of_a_ramp():
@@ -109,14 +109,14 @@ def short(name, **plant):
 def test_the_actual_disturbance_is_the_one_that_was_flown():
     quiet = {f"initial.{rate}": 0.0 for rate in "PQR"}
     case = short("nominal_di", **quiet, **{"disturbance.Q.constant": 2.0})
-    found = record(fly(case), False).actual_disturbance / RADIANS
+    found = record_of(fly(case), False).actual_disturbance / RADIANS
     # within a step of 0.01 s the law turns a fiftieth of the disturbance away
     assert found[:, 1] == pytest.approx(2.0, abs=0.05)
     assert found[:, [0, 2]] == pytest.approx(0.0, abs=0.01)
 
 
 def test_a_learner_that_learned_misses_less_than_it_did_at_first():
-    flown = record(fly(short("neuro_adaptive_di")), False)
+    flown = record_of(fly(short("neuro_adaptive_di")), False)
     learned = measure(flown, short("neuro_adaptive_di").control)["learner"]["pitch"]
     assert abs(learned["estimate_final_dps2"]) < learned["estimate_rms_dps2"] / 3
     assert learned["observer_largest_dps"] < 0.7  # k_b
@@ -124,7 +124,7 @@ def test_a_learner_that_learned_misses_less_than_it_did_at_first():
 
 def test_summary_and_report_have_one_definition():
     case = short("nominal_di")
-    flown = record(fly(case), False)
+    flown = record_of(fly(case), False)
     summary, metrics = summarize(flown, ""), measure(flown, case.control)
     assert summary["fuel_kg"] == metrics["fuel_kg"] > 0
     assert summary["max_abs_alpha_deg"] == metrics["margins"]["alpha"]["largest_deg"]
@@ -136,7 +136,7 @@ def test_why_a_flight_ended_early_is_found_from_the_bag_as_the_engine_said(tmp_p
     said, _ = fly_library(case, tmp_path / "bag")
     assert said and why_ended_early(read_bag(tmp_path / "bag"), case) == said
     whole = short("nominal_di")
-    assert why_ended_early(record(fly(whole), False), whole) == ""
+    assert why_ended_early(record_of(fly(whole), False), whole) == ""
 
 
 def test_an_interrupted_recording_is_not_taken_for_a_termination(tmp_path):

@@ -4,7 +4,7 @@
 import pytest
 
 from ahv_analysis.bag.reader import read_bag
-from ahv_analysis.bag.record import record
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.bag.solver_status import lost_status, surfaces_lost_at
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.campaign.batch import fly_alone
@@ -23,7 +23,7 @@ SHORT = {"duration": 2.0}
 def verdicts(case):
     """What a campaign makes of a case, and what the summary of its flight does."""
     steps = list(fly(case))
-    found = summarize(record(steps, False), steps[-1].ended_early)
+    found = summarize(record_of(steps, False), steps[-1].ended_early)
     alone = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
     assert found["success"] == (found["cause"] == "success")
     return Cause(int(alone.cause)).name.lower(), found["cause"]

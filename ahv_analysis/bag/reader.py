@@ -43,7 +43,7 @@ _SETTINGS = relative(SETTINGS.name), SETTINGS.type_name
 _LOOP = {relative(topic.name): topic for topic in LOOP_TOPICS}
 
 
-class Held(NamedTuple):
+class BagTopic(NamedTuple):
     """A topic of a bag."""
 
     type_name: str
@@ -57,7 +57,7 @@ class Bag(NamedTuple):
     bytes: int  # of its files
     custom: dict[str, str]  # texts by their keys
     notes: Notes | None  # of its recorder, else of what the nodes told; None if nobody did
-    topics: dict[str, Held]  # by name, those without messages too
+    topics: dict[str, BagTopic]  # by name, those without messages too
     series: dict[LoopTopic, Series]  # of the control loop: topics with messages that were obeyed
     refused: list[Refused]  # messages of the control loop that no receiver obeyed
     kept: dict[str, list[bytes]]  # messages of the topics asked for, CDR
@@ -105,7 +105,7 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
     A message that no receiver obeyed is left out, and counted.
     """
     collectors: dict[str, Collector] = {}
-    topics: dict[str, Held] = {}
+    topics: dict[str, BagTopic] = {}
     own: list[Metadata] = []
     kept: dict[str, list[bytes]] = {name: [] for name in keep}
     diagnostics: list[tuple[int, bytes]] = []  # with the number of their publisher
@@ -169,9 +169,9 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
     )
 
 
-def _namespace(path: Path, topics: Mapping[str, Held]) -> str:
+def _namespace(path: Path, topics: Mapping[str, BagTopic]) -> str:
     """Namespace of the vehicle that a bag is of: where its state and its surface command are."""
-    flown = {name for name, held in topics.items() if held.messages}
+    flown = {name for name, topic in topics.items() if topic.messages}
     found = sorted(
         namespace
         for namespace, _, last in (name.rpartition("/") for name in flown)
@@ -188,17 +188,17 @@ def _namespace(path: Path, topics: Mapping[str, Held]) -> str:
 def load_bag(path: Path) -> dict[str, Recorded]:
     """All messages of the bag `path` by topic, as they are: for bags that memory holds."""
     found = bag_files(path)
-    held: dict[str, Held] = {}
+    types: dict[str, BagTopic] = {}
     topics: dict[str, Recorded] = {}
-    for portion in _portions(found.path, found.files, held, []):
+    for portion in _portions(found.path, found.files, types, []):
         recorded = topics.setdefault(portion.topic, Recorded(portion.type_name, [], []))
         recorded.log_times.extend(portion.heads["log_time"].tolist())
         recorded.messages.extend(data for _, data in portion.bodies())
-    return {name: Recorded(held[name].type_name, [], []) for name in held} | topics
+    return {name: Recorded(types[name].type_name, [], []) for name in types} | topics
 
 
 def _portions(
-    bag: Path, files: list[Path], topics: dict[str, Held], own: list[Metadata]
+    bag: Path, files: list[Path], topics: dict[str, BagTopic], own: list[Metadata]
 ) -> Iterator[_Portion]:
     """Messages of a whole bag, in the order of its files; BagError where one is damaged.
 
@@ -219,7 +219,7 @@ def _portions(
                 elif isinstance(piece, Channel):
                     type_name = schemas.get(piece.schema_id, "")
                     channels[piece.id] = piece.topic, type_name
-                    topics.setdefault(piece.topic, Held(type_name, 0))
+                    topics.setdefault(piece.topic, BagTopic(type_name, 0))
                 elif isinstance(piece, Metadata):
                     own[:] = [piece]
                 elif isinstance(piece, Block):
@@ -233,7 +233,7 @@ def _by_channel(
     block: Block,
     file: PlainFile,
     channels: dict[int, tuple[str, str]],
-    topics: dict[str, Held],
+    topics: dict[str, BagTopic],
 ) -> Iterator[_Portion]:
     heads = block.heads
     for channel in np.unique(heads["channel"]).tolist():
@@ -242,9 +242,9 @@ def _by_channel(
         name, type_name = channels[channel]
         places = np.flatnonzero(heads["channel"] == channel)
         packed = block.body(places[0]).startswith(ZSTD_MAGIC)
-        held = topics[name]  # of a topic with channels of two types, the first with messages
-        shown = held.type_name if held.messages else type_name
-        topics[name] = Held(shown, held.messages + len(places))
+        topic = topics[name]  # of a topic with channels of two types, the first with messages
+        shown = topic.type_name if topic.messages else type_name
+        topics[name] = BagTopic(shown, topic.messages + len(places))
         yield _Portion(name, type_name, block, places, heads[places], packed, file)
 
 
@@ -268,12 +268,12 @@ def flight_of(bag: Bag) -> FlightRecord:
         within(bag.namespace, topic.name) for topic in _required(bag) if topic not in bag.series
     ]
     if missing:
-        held = ", ".join(name for name, topic in bag.topics.items() if topic.messages)
+        there = ", ".join(name for name, topic in bag.topics.items() if topic.messages)
         refused = [entry for entry in bag.refused if entry.topic in missing]
         why = f"; {refused[0].messages} were refused, first {refused[0].first}" if refused else ""
         raise BagError(
             f"{bag.path} holds no messages on {', '.join(missing)}, "
-            f"but {f'on {held}' if held else 'none at all'}{why}"
+            f"but {f'on {there}' if there else 'none at all'}{why}"
         )
     stamps = bag.series[STATE].stamps
     for found, _ in bag.series.values():

@@ -117,7 +117,7 @@ class Step(NamedTuple):
     ended_early: str  # why this is the last step before its time; empty if it is not
 
 
-def record(steps: Iterable[Step], geometric: bool) -> FlightRecord:
+def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     """Arrays of the steps of a library flight."""
     stamps = array("q")
     lost_at = None

@@ -217,7 +217,7 @@ def fly_campaign(
                 count += len(part.flown[-1]["run"])
                 part.jobs_left -= 1
                 if part.jobs_left == 0:
-                    write_part(part_file(kept, start), [*part.held, *part.flown], described)
+                    write_part(part_file(kept, start), [*part.filed, *part.flown], described)
                     del parts[start]
             progress(min(count, campaign.runs))
     finally:
@@ -229,7 +229,7 @@ def fly_campaign(
                     parts[start].flown.append(result)
         for start, part in parts.items():
             if part.flown:
-                write_part(part_file(kept, start), [*part.held, *part.flown], described)
+                write_part(part_file(kept, start), [*part.filed, *part.flown], described)
 
 
 def _flown(job: Future[Columns | str]) -> Columns:
@@ -250,7 +250,7 @@ def _flown(job: Future[Columns | str]) -> Columns:
 class _Part:
     """A part of which not everything is flown."""
 
-    held: list[Columns]  # by the folder
+    filed: list[Columns]  # by the folder
     flown: list[Columns]
     jobs_left: int
 
@@ -265,15 +265,15 @@ def _jobs(
     for start in range(0, campaign.runs, PART_RUNS):
         end = min(start + PART_RUNS, campaign.runs)
         path = part_file(kept, start)
-        held = [read_part(path)[0]] if path.exists() else []
-        done = set(held[0]["run"].tolist()) if held else set()
+        filed = [read_part(path)[0]] if path.exists() else []
+        done = set(filed[0]["run"].tolist()) if filed else set()
         jobs = [
             (start, first, min(RUNS_PER_JOB, end - first))
             for first in range(start, end, RUNS_PER_JOB)
             if not done.issuperset(range(first, min(first + RUNS_PER_JOB, end)))
         ]
         if jobs:
-            parts[start] = _Part(held, [], len(jobs))
+            parts[start] = _Part(filed, [], len(jobs))
         yield from jobs
 
 

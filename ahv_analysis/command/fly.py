@@ -122,17 +122,17 @@ def fly(
             ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
         else:
             ended_early, wall = fly_library(flight, bag, progress=progress)
-    held = read(bag)
+    contents = read(bag)
     try:
-        record = flight_of(held)
+        record = flight_of(contents)
     except BagError as error:
         raise GraphError(ended_early or str(error)) from error
     flown = record.stamps[-1] // STEP_NS if ended_early else flight.plant.steps
-    missing = missing_states(held, int(flown))
+    missing = missing_states(contents, int(flown))
     summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
     summary["dispersion"] = flight.plant.truth.dispersion._asdict()
     summary |= summarize(record, ended_early, missing)
-    summary["refused"] = refused_facts(held)
+    summary["refused"] = refused_facts(contents)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     with signals_wait():
         summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")

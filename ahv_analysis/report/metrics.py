@@ -74,7 +74,7 @@ def largest(values: Array) -> float:
     return float(np.max(np.abs(values)))
 
 
-def held(time: Array, values: Array | NDArray[np.bool_]) -> float:
+def integral(time: Array, values: Array | NDArray[np.bool_]) -> float:
     """Integral over `time` (N+1,) [s] of values (N+1,) that hold from each sample to the next."""
     return float(np.sum(values[:-1] * np.diff(time)))
 
@@ -119,9 +119,9 @@ def use(time: Array, command: Array, stops: tuple[float, float]) -> Use:
     return Use(
         float(np.min(command)),
         float(np.max(command)),
-        held(time, np.square(command)),
+        integral(time, np.square(command)),
         float(np.sum(np.abs(np.diff(command)))),
-        held(time, (command <= lower) | (command >= upper)),
+        integral(time, (command <= lower) | (command >= upper)),
     )
 
 
@@ -133,7 +133,7 @@ def margin(time: Array, angle: Array, bound: float) -> Margin:
         largest(angle) * DEGREES,
         float(time[np.argmax(size)]),
         (bound - largest(angle)) * DEGREES,
-        held(time, beyond),
+        integral(time, beyond),
         float(time[np.argmax(beyond)]) if np.any(beyond) else None,
     )
 

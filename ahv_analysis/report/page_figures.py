@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ahv_analysis.bag.reader import flight_of, read
-from ahv_analysis.bag.record import FlightRecord, record
+from ahv_analysis.bag.record import FlightRecord, record_of
 from ahv_analysis.campaign.batch import fly_trajectory
 from ahv_analysis.campaign.campaign import Campaign
 from ahv_analysis.flight.case import Case, make_case
@@ -35,9 +35,9 @@ DRAWN_EVERY = 10  # steps between the points of a campaign's lines
 
 def bag_figures(bag: Path) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
     """Which figures of the report a bag is for, and how to draw one."""
-    held = read(bag)
-    case = make_case(held.notes.case, held.notes.parameters) if held.notes else None
-    return flight_figures(flight_of(held), case)
+    contents = read(bag)
+    case = make_case(contents.notes.case, contents.notes.parameters) if contents.notes else None
+    return flight_figures(flight_of(contents), case)
 
 
 def flight_figures(
@@ -58,7 +58,7 @@ def flight_figures(
 
 
 def _fly(case: Case) -> FlightRecord:
-    return record(fly(case), case.plant.truth.geometric)
+    return record_of(fly(case), case.plant.truth.geometric)
 
 
 def campaign_figures(

@@ -83,8 +83,8 @@ def read_flights(bags: Sequence[Path]) -> list[Flight]:
 
 
 def _read(bag: Path, name: str) -> Flight:
-    held = read(bag)
-    record, notes = flight_of(held), held.notes
+    contents = read(bag)
+    record, notes = flight_of(contents), contents.notes
     if record.steps < 1:
         raise BagError(f"{bag} holds no two steps with all their messages: there was no flight")
     case = make_case(notes.case, notes.parameters) if notes else None
@@ -92,7 +92,7 @@ def _read(bag: Path, name: str) -> Flight:
     ended_early = why_ended_early(record, case) if case else ""
     cause = failure(record, ended_early) if case else None
     content = notes.content if notes else {}
-    refused = refused_facts(held)
+    refused = refused_facts(contents)
     return Flight(name, bag, record, content, case, metrics, ended_early, cause, refused)
 
 

@@ -7,9 +7,8 @@ from operator import le
 
 from ahv_msgs_py.layout import MessageError
 from ahv_msgs_py.node.faults import PERIOD, SILENCE, STALE, Fault
+from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.topics import LoopTopic
-
-Values = tuple[float, ...]
 
 
 class Refusal(Exception):
