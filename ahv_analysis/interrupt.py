@@ -8,11 +8,13 @@ callback of ROS, where it ends in a segmentation fault, or where Python ignores 
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 from ahv_msgs_py.node.deadline import end_within
 
+Part = TypeVar("Part")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 CLEAR_LINE_AND_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # after a progress bar
 
@@ -44,6 +46,17 @@ def signals_wait() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
         if came:
             signal.raise_signal(came[0])
+
+
+def until(interrupted: Callable[[], bool], parts: Iterable[Part]) -> Iterator[Part]:
+    """Parts of long work, as they come; KeyboardInterrupt once `interrupted()`.
+
+    Within `signals_wait` the signal then has its effect, and what was begun is put away before.
+    """
+    for part in parts:
+        if interrupted():
+            raise KeyboardInterrupt
+        yield part
 
 
 def end_on_signals() -> None:

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ahv_analysis.bag.record import Array, FlightRecord
+from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.rows import Array, Rows
 from ahv_control.flight_control import FlightControl
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
@@ -105,7 +106,7 @@ class Quantity(NamedTuple):
 
 
 # The arrays of a record that hold a topic's fields, and the first field that they hold.
-ARRAYS: dict[LoopTopic, tuple[Callable[[FlightRecord], Array | None], int]] = {
+ARRAYS: dict[LoopTopic, tuple[Callable[[FlightRecord], Rows | None], int]] = {
     STATE: (lambda record: record.states, 0),
     ATTITUDE_COMMAND: (lambda record: record.attitude_commands, 0),
     RATE_COMMAND: (lambda record: record.rate_commands, 0),

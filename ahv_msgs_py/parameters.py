@@ -7,6 +7,8 @@ from difflib import get_close_matches
 from math import isfinite
 from typing import NamedTuple
 
+from ahv_msgs_py.layout import excerpt
+
 SIMULATED_TIME = "use_sim_time"  # which ROS gives to every node
 BASE = "base"  # a case of the package, of which a file says what differs
 # What cases set for all nodes by `/**`: a node that has no use for one of them says nothing.
@@ -55,7 +57,8 @@ class Parameter(NamedTuple):
             if self.minimum is not None and self.maximum is not None:
                 fits = fits and self.minimum <= value <= self.maximum
         if not fits or not isinstance(value, bool | int | float | str):
-            raise ParameterError(f"{node}: {self.name} is {value!r}, but must be {self.valid}")
+            shown = excerpt(value) if isinstance(value, str) else repr(value)
+            raise ParameterError(f"{node}: {self.name} is {shown}, but must be {self.valid}")
         return value
 
 
@@ -87,7 +90,7 @@ def check_parameters(
     for name in values:
         if name not in known:
             raise ParameterError(
-                f"{node}: there is no parameter {name!r}; "
+                f"{node}: there is no parameter {excerpt(name)}; "
                 f"{meant(name, known)}valid are {', '.join(known)}"
             )
     return {

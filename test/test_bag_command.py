@@ -2,12 +2,15 @@
 """`ahv bag`: facts, recovery, tables; damage is one sentence, exit code 2, and left as it is."""
 
 import json
+import signal
 
 import pytest
 from typer.testing import CliRunner
 
+from ahv_analysis.bag.dataset import bag_parts
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.command.app import app
+from ahv_analysis.command.bag import export
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly_library
 from test.bags import DAMAGES, cut_in_flight, one_bit_flipped, without_a_topic, without_metadata
@@ -154,6 +157,20 @@ def test_export_writes_what_is_asked_for(tmp_path, whole):
     assert facts["files"] == {kind: str(file) for kind, file in files.items()}
     assert (facts["samples"], facts["signals"]) == (101, 29)
     assert all(file.stat().st_size > 10_000 for file in files.values())
+
+
+def test_an_export_ends_on_a_signal_and_leaves_nothing(tmp_path, whole, monkeypatch):
+    def parts(bag):
+        part = next(bag_parts(bag))
+        yield part
+        signal.raise_signal(signal.SIGINT)
+        yield part
+
+    monkeypatch.setattr("ahv_analysis.bag.dataset.bag_parts", parts)
+    for kind in ("csv", "parquet", "netcdf"):
+        with pytest.raises(KeyboardInterrupt):
+            export(whole, **{kind: tmp_path / kind})
+        assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,15 @@ def test_a_bag_without_its_metadata_or_index_loses_nothing(tmp_path, whole, dama
         assert recovery.lost_messages == 0 and bag_info(tmp_path / "new")["complete"]
 
 
+@pytest.mark.parametrize("pieces", [0, 5, 60])
+def test_a_recovery_ends_on_a_signal_and_leaves_nothing(tmp_path, whole, pieces):
+    without_metadata(tmp_path / "bag", whole)
+    heard = iter([*[False] * pieces, True])
+    with pytest.raises(KeyboardInterrupt):
+        recover(tmp_path / "bag", tmp_path / "new", lambda: next(heard))
+    assert [path.name for path in tmp_path.iterdir()] == ["bag"]
+
+
 def test_a_bag_that_was_cut_in_flight_keeps_its_beginning(tmp_path, whole):
     cut_in_flight(tmp_path / "bag", whole)
     recovery = recover(tmp_path / "bag", tmp_path / "new")

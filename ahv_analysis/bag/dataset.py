@@ -1,19 +1,24 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """A flight as an xarray Dataset, time x signal, and as the files that other tools read."""
 
-import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import chain
 from pathlib import Path
+from typing import IO, Any
 
+import numpy as np
 import pyarrow
 import pyarrow.csv
 import pyarrow.parquet
 import xarray
+from scipy.io import netcdf_file, netcdf_variable
 
 from ahv_analysis.bag.notes import Notes
-from ahv_analysis.bag.reader import flight_of, read
+from ahv_analysis.bag.reader import Bag, flight_of, read
 from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.rows import GrowingRows, Rows
 from ahv_analysis.quantities import QUANTITIES, Quantity
 
 DERIVED = "derived"  # source of a signal that is not recorded
@@ -56,41 +61,94 @@ def _attributes(one: Quantity) -> dict[str, str]:
     }
 
 
-def _table(flight: xarray.Dataset, named: Callable[[str, str], str]) -> pyarrow.Table:
-    """A column per signal, time first; `named(name, units)` is its heading."""
-    columns = [flight["time"], *flight.data_vars.values()]
-    fields = [
-        pyarrow.field(
-            named(str(column.name), column.attrs["units"]),
-            pyarrow.float64(),
-            metadata={key: str(value) for key, value in column.attrs.items()},
-        )
-        for column in columns
-    ]
-    schema = pyarrow.schema(
-        fields, metadata={key: str(value) for key, value in flight.attrs.items()}
+def bag_parts(bag: Bag) -> Iterator[xarray.Dataset]:
+    """The flight of `bag_dataset` in pieces, one behind the other, as exports take it."""
+    record = flight_of(bag)
+    refused = sum(entry.messages for entry in bag.refused)
+    return (
+        flight_dataset(part, bag.notes).assign_attrs(refused=refused) for part in record.parts()
     )
-    return pyarrow.table([column.values for column in columns], schema)
 
 
-def csv_bytes(flight: xarray.Dataset) -> bytes:
+def _tables(
+    parts: Iterable[xarray.Dataset], named: Callable[[str, str], str]
+) -> Iterator[pyarrow.Table]:
+    """A column per signal, time first; `named(name, units)` is its heading."""
+    for flight in parts:
+        columns = [flight["time"], *flight.data_vars.values()]
+        fields = [
+            pyarrow.field(
+                named(str(column.name), column.attrs["units"]),
+                pyarrow.float64(),
+                metadata={key: str(value) for key, value in column.attrs.items()},
+            )
+            for column in columns
+        ]
+        schema = pyarrow.schema(
+            fields, metadata={key: str(value) for key, value in flight.attrs.items()}
+        )
+        yield pyarrow.table([column.values for column in columns], schema)
+
+
+def _write_tables(
+    tables: Iterator[pyarrow.Table],
+    writer: Callable[[IO[bytes], pyarrow.Schema], Any],
+    sink: IO[bytes],
+) -> None:
+    first = next(tables)
+    with writer(sink, first.schema) as writing:
+        for table in chain([first], tables):
+            writing.write_table(table)
+
+
+def write_csv(parts: Iterable[xarray.Dataset], sink: IO[bytes]) -> None:
     """CSV with headings like "u [m/s]"; every number keeps all its bits."""
-    sink = io.BytesIO()
-    pyarrow.csv.write_csv(_table(flight, lambda name, units: f"{name} [{units}]"), sink)
-    return sink.getvalue()
+    tables = _tables(parts, lambda name, units: f"{name} [{units}]")
+    _write_tables(tables, pyarrow.csv.CSVWriter, sink)
 
 
-def parquet_bytes(flight: xarray.Dataset) -> bytes:
+def write_parquet(parts: Iterable[xarray.Dataset], sink: IO[bytes]) -> None:
     """Parquet; units, frames and notes are metadata of the schema."""
-    sink = io.BytesIO()
-    pyarrow.parquet.write_table(_table(flight, lambda name, units: name), sink)
-    return sink.getvalue()
+    tables = _tables(parts, lambda name, units: name)
+    doubles = partial(pyarrow.parquet.ParquetWriter, use_dictionary=False)  # few are alike
+    _write_tables(tables, doubles, sink)
 
 
-def netcdf_bytes(flight: xarray.Dataset) -> bytes:
-    """The netCDF 3 file that scipy writes: doubles and texts are all that a flight has."""
-    content: bytes = bytes(flight.to_netcdf(engine="scipy"))
-    return content
+class _Column:
+    """What scipy asks an array for when it writes one, of numbers that are read only then."""
+
+    dtype = np.dtype(">f8")  # of netCDF
+    itemsize = dtype.itemsize
+
+    def __init__(self, rows: Rows, place: int):
+        self._rows, self._place = rows, place
+        self.size = len(rows)
+        self.shape = (self.size,)
+
+    def tobytes(self) -> bytes:
+        """Read the numbers."""
+        return self._rows[:, self._place].astype(self.dtype).tobytes()
 
 
-EXPORTS = {"csv": csv_bytes, "parquet": parquet_bytes, "netcdf": netcdf_bytes}
+def write_netcdf(parts: Iterable[xarray.Dataset], sink: IO[bytes]) -> None:
+    """A netCDF 3 file by scipy: doubles and texts are all that a flight has."""
+    signals: list[Any] = []
+    for flight in parts:
+        if not signals:
+            signals = [*flight.data_vars.values(), flight["time"]]
+            attributes, growing = flight.attrs, GrowingRows(len(signals))
+        growing.extend(np.column_stack([flight[signal.name].values for signal in signals]))
+    rows = growing.rows()
+    file = netcdf_file(sink, "w", version=2)
+    for name, value in attributes.items():
+        setattr(file, name, value)
+    file.createDimension("time", len(rows))
+    for place, signal in enumerate(signals):
+        of_signal = signal.attrs | ({} if signal.name == "time" else {"_FillValue": np.nan})
+        file.variables[signal.name] = netcdf_variable(
+            _Column(rows, place), "d", 8, (len(rows),), ("time",), of_signal
+        )
+    file.close()
+
+
+EXPORTS = {"csv": write_csv, "parquet": write_parquet, "netcdf": write_netcdf}

@@ -13,6 +13,7 @@ from ahv_msgs_py.parameters import Value
 NOTES = "ahv"  # key of the notes of a flight
 UNNAMED = "unnamed"  # case of nodes that were started by hand
 RECOVERED = "ahv_recovered"  # key of what was lost before a recovery
+LONGEST_NAME = 255  # characters of a case, which is that of a file
 _NODES = ("plant", "inner_loop")  # without which there is no flight
 
 
@@ -41,18 +42,26 @@ class Notes(NamedTuple):
 
 def read_notes(custom: Mapping[str, str]) -> Notes | None:
     """Notes of a flight among the texts of a bag; None if there are none of the shape of ours."""
-    content = _json(custom.get(NOTES, ""))
+    content = json_object(custom.get(NOTES, ""))
+    if not names_a_case(content):
+        return None
+    return Notes(content["case"], content["parameters"], content)
+
+
+def names_a_case(content: Mapping[str, Any]) -> bool:
+    """Whether something has a case and parameters of nodes, of whatever values."""
     case, parameters = content.get("case"), content.get("parameters")
     if not isinstance(case, str) or not isinstance(parameters, dict):
-        return None
+        return False
+    if len(case) > LONGEST_NAME or not case.isprintable():
+        return False
     if not all(node in parameters for node in _NODES):
-        return None
-    for values in parameters.values():
-        if not isinstance(values, dict):
-            return None
-        if not all(isinstance(value, bool | int | float | str) for value in values.values()):
-            return None
-    return Notes(case, parameters, content)
+        return False
+    return all(
+        isinstance(values, dict)
+        and all(isinstance(value, bool | int | float | str) for value in values.values())
+        for values in parameters.values()
+    )
 
 
 def told_of(data: bytes) -> tuple[str, dict[str, Value]]:
@@ -78,12 +87,12 @@ def read_losses(custom: Mapping[str, str]) -> dict[str, Any] | None:
     """What a recovery says that was lost; None in a bag that was not recovered."""
     if RECOVERED not in custom:
         return None
-    content = _json(custom[RECOVERED])
+    content = json_object(custom[RECOVERED])
     lost = content.get("lost_messages")
     return content | {"lost_messages": lost if isinstance(lost, int) else None}
 
 
-def _json(text: str) -> dict[str, Any]:
+def json_object(text: str) -> dict[str, Any]:
     """Return the JSON object that a text is, empty if it is none that can be written again."""
     try:
         content = json.loads(text, parse_constant=_refuse, parse_int=_integer)

@@ -17,6 +17,7 @@ from ahv_analysis.bag.metadata import custom_of_record
 from ahv_analysis.bag.notes import Notes, read_notes, told_notes
 from ahv_analysis.bag.plain_file import ZSTD_MAGIC, PlainFile, UnpackError
 from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.rows import Rows, part_of
 from ahv_analysis.bag.series import AmbiguousError, Collector, Refused, Series
 from ahv_analysis.bag.solver_status import says_inner_loop, surfaces_lost_at
 from ahv_analysis.errors import BagError
@@ -141,7 +142,7 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
                     f"does not tell apart: {error}"
                 ) from error
             if len(obeyed.stamps):
-                series[topic] = obeyed
+                series[topic] = _sharing(obeyed, series)
             refused += collector.refused
         elif name in others:
             raise BagError(
@@ -167,6 +168,14 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
         namespace,
         lost_at,
     )
+
+
+def _sharing(found: Series, others: Mapping[LoopTopic, Series]) -> Series:
+    """Messages whose stamps, if they are those of other messages, are in memory once."""
+    for other in others.values():
+        if np.array_equal(found.stamps, other.stamps):
+            return Series(other.stamps, found.values)
+    return found
 
 
 def _namespace(path: Path, topics: Mapping[str, BagTopic]) -> str:
@@ -281,27 +290,27 @@ def flight_of(bag: Bag) -> FlightRecord:
             stamps = np.intersect1d(stamps, found, assume_unique=True)
     if not len(stamps):
         raise BagError(f"{bag.path} holds no step with all of its messages")
-    arrays = {topic: _at(found, stamps) for topic, found in bag.series.items()}
-    estimates = arrays.get(DISTURBANCE_ESTIMATE)
+    rows = {topic: _at(found, stamps) for topic, found in bag.series.items()}
+    estimates = rows.get(DISTURBANCE_ESTIMATE)
     return FlightRecord(
         stamps,
-        arrays[STATE],
-        arrays[ATTITUDE_COMMAND],
-        arrays[RATE_COMMAND],
-        arrays[SURFACE_COMMAND],
-        arrays[THROTTLE_COMMAND][:, 0],
+        rows[STATE],
+        rows[ATTITUDE_COMMAND],
+        rows[RATE_COMMAND],
+        rows[SURFACE_COMMAND],
+        rows[THROTTLE_COMMAND][:, 0],
         bag.notes is not None and bag.notes.geometric,
-        arrays.get(LEARNER),
-        None if estimates is None else estimates[:, 3:],
+        rows.get(LEARNER),
+        None if estimates is None else part_of(estimates, slice(None), slice(3, None)),
         bag.surfaces_lost_at,
     )
 
 
-def _at(found: Series, stamps: NDArray[np.int64]) -> NDArray[np.float64]:
+def _at(found: Series, stamps: NDArray[np.int64]) -> Rows:
     """Values at stamps that are all there."""
     if len(found.stamps) == len(stamps):
         return found.values
-    return found.values[np.searchsorted(found.stamps, stamps)]
+    return part_of(found.values, np.searchsorted(found.stamps, stamps))
 
 
 def _required(bag: Bag) -> tuple[LoopTopic, ...]:

@@ -2,7 +2,7 @@
 """A flight as arrays, whether it comes from a bag or from memory, and what is derived from it."""
 
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -10,32 +10,46 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ahv_analysis.bag.rows import BLOCK, Array, GrowingRows, Rows
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.law import Commands
 from ahv_control.learner_message import learner_values
 from ahv_control.newton_raphson import SolverStatus, nominal_response
 from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.topics import LEARNER_NAMES
 from ahv_plant.model.aerodynamics import AirData, air_data
 from ahv_plant.model.constants import UNSTART_ALPHA
 from ahv_plant.model.vectors import Rates, State, Surfaces
 from ahv_plant.numerics.elementwise import kernel
 
-Array = NDArray[np.float64]
+
+class Air:
+    """The fields of AirData over a flight, each read when it is asked for."""
+
+    def __init__(self, rows: Rows):
+        """`rows` (N+1, 7) in the order of AirData."""
+        self._rows = rows
+
+    def __getattr__(self, name: str) -> Array:
+        """A field of AirData, an array (N+1,)."""
+        if name not in AirData._fields:
+            raise AttributeError(name)
+        return np.ascontiguousarray(self._rows[:, AirData._fields.index(name)])
 
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """N + 1 states and the commands that answer them."""
+    """N + 1 states and the commands that answer them; those of a long flight are on the disk."""
 
     stamps: NDArray[np.int64]  # (N+1,) [ns]
-    states: Array  # (N+1, 13) in the order and units of State
-    attitude_commands: Array  # (N+1, 3) [rad]
-    rate_commands: Array  # (N+1, 3) [rad/s]
-    surfaces: Array  # (N+1, 3) [rad]
+    states: Rows  # (N+1, 13) in the order and units of State
+    attitude_commands: Rows  # (N+1, 3) [rad]
+    rate_commands: Rows  # (N+1, 3) [rad/s]
+    surfaces: Rows  # (N+1, 3) [rad]
     throttle: Array  # (N+1,) [-]
     geometric: bool  # h is a geometric altitude
-    learner: Array | None = None  # (N+1, 39) X_a, X_d [rad/s] and weights, of an adaptive flight
-    estimates: Array | None = None  # (N+1, 3) d-hat [rad/s^2], of an adaptive flight
+    learner: Rows | None = None  # (N+1, 39) X_a, X_d [rad/s] and weights, of an adaptive flight
+    estimates: Rows | None = None  # (N+1, 3) d-hat [rad/s^2], of an adaptive flight
     surfaces_lost_at: int | None = None  # [ns] when the surfaces first could not turn the vehicle
 
     @property
@@ -48,17 +62,38 @@ class FlightRecord:
         """Time (N+1,) [s]."""
         return self.stamps / NANOSECONDS
 
+    def parts(self) -> Iterator["FlightRecord"]:
+        """The flight in pieces, one behind the other, each of arrays in memory."""
+        for start in range(0, len(self.stamps), BLOCK):
+            part = slice(start, start + BLOCK)
+            yield FlightRecord(
+                self.stamps[part],
+                self.states[part],
+                self.attitude_commands[part],
+                self.rate_commands[part],
+                self.surfaces[part],
+                self.throttle[part],
+                self.geometric,
+                None if self.learner is None else self.learner[part],
+                None if self.estimates is None else self.estimates[part],
+                self.surfaces_lost_at,
+            )
+
     def column(self, name: str) -> Array:
         """One state (N+1,) by its name."""
         column: Array = self.states[:, State._fields.index(name)]
         return column
 
     @cached_property
-    def air(self) -> AirData:
+    def air(self) -> Air:
         """Air data, every field an array (N+1,)."""
-        rows = np.empty((len(self.states), len(AirData._fields)))
-        _fill_air_data(np.ascontiguousarray(self.states), self.geometric, rows)
-        return AirData(*np.ascontiguousarray(rows.T))
+        growing = GrowingRows(len(AirData._fields))
+        for start in range(0, len(self.states), BLOCK):
+            states = np.ascontiguousarray(self.states[start : start + BLOCK])
+            rows = np.empty((len(states), len(AirData._fields)))
+            _fill_air_data(states, self.geometric, rows)
+            growing.extend(rows)
+        return Air(growing.rows())
 
     @cached_property
     def climb_angle(self) -> Array:
@@ -83,9 +118,11 @@ class FlightRecord:
         is what the learner has to learn.
         """
         mean = np.diff(self.states[:, 3:6], axis=0) / np.diff(self.time)[:, None]
-        for step, rate in enumerate(mean):
-            state, surfaces = State(*self.states[step].tolist()), self.surfaces[step].tolist()
-            rate -= nominal_response(state, Surfaces(*surfaces), self.geometric)
+        for start in range(0, self.steps, BLOCK):
+            part = slice(start, start + BLOCK)
+            flown = zip(self.states[part].tolist(), self.surfaces[part].tolist(), strict=True)
+            for rate, (state, surfaces) in zip(mean[part], flown, strict=False):
+                rate -= nominal_response(State(*state), Surfaces(*surfaces), self.geometric)
         return mean
 
     @property
@@ -119,34 +156,33 @@ class Step(NamedTuple):
 
 def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     """Arrays of the steps of a library flight."""
-    stamps = array("q")
-    lost_at = None
-    states, attitudes, rates, surfaces, throttles, learners, estimates = (
-        array("d") for _ in range(7)
-    )
+    stamps, throttles = array("q"), array("d")
+    states, learners = GrowingRows(len(State._fields)), GrowingRows(len(LEARNER_NAMES))
+    attitudes, rates, surfaces, estimates = (GrowingRows(3) for _ in range(4))
+    adaptive, lost_at = False, None
     for step in steps:
         stamps.append(step.stamp)
         if lost_at is None and step.commands.status == SolverStatus.SINGULAR:
             lost_at = step.stamp
-        states.extend(step.state)
-        attitudes.extend(step.commands.attitude)
-        rates.extend(step.commands.rates)
-        surfaces.extend(step.commands.surfaces)
+        states.append(step.state)
+        attitudes.append(step.commands.attitude)
+        rates.append(step.commands.rates)
+        surfaces.append(step.commands.surfaces)
         throttles.append(step.commands.throttle)
         if step.learner is not None:
+            adaptive = True
             body = Rates(step.state.P, step.state.Q, step.state.R)
-            learners.extend(learner_values(step.learner))
-            estimates.extend(disturbance_estimate(step.learner, body))
-    count = len(stamps)
+            learners.append(learner_values(step.learner))
+            estimates.append(disturbance_estimate(step.learner, body))
     return FlightRecord(
         np.frombuffer(stamps, np.int64),
-        np.frombuffer(states).reshape(count, -1),
-        np.frombuffer(attitudes).reshape(count, -1),
-        np.frombuffer(rates).reshape(count, -1),
-        np.frombuffer(surfaces).reshape(count, -1),
+        states.rows(),
+        attitudes.rows(),
+        rates.rows(),
+        surfaces.rows(),
         np.frombuffer(throttles),
         geometric,
-        np.frombuffer(learners).reshape(count, -1) if learners else None,
-        np.frombuffer(estimates).reshape(count, -1) if estimates else None,
+        learners.rows() if adaptive else None,
+        estimates.rows() if adaptive else None,
         lost_at,
     )

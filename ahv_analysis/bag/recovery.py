@@ -7,7 +7,7 @@ Its files are walked twice: what the topics are called may stand at their ends.
 import json
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from struct import Struct
@@ -34,6 +34,7 @@ from ahv_analysis.bag.metadata import (
 from ahv_analysis.bag.notes import RECOVERED
 from ahv_analysis.bag.plain_file import ZSTD_MAGIC, PlainFile, Room, UnpackError
 from ahv_analysis.errors import BagError
+from ahv_analysis.interrupt import until
 
 LARGEST = 2**20  # [bytes] of a chunk
 MOST_LOSSES = 100  # of a file that are told one by one
@@ -79,12 +80,15 @@ class _Found(NamedTuple):
         return self.path.name.removesuffix(".zstd")
 
 
-def recover(path: Path, out: Path) -> Recovery | None:
+def recover(
+    path: Path, out: Path, interrupted: Callable[[], bool] = lambda: False
+) -> Recovery | None:
     """Write what is readable of the bag `path`, a folder or a file, to the new folder `out`.
 
     None, and nothing written, if the bag is whole. Nothing in `path` is touched: a recovery that
     is stopped itself can be begun again, and another tool may yet read more. BagError if nothing
-    is readable, or `out` exists or cannot be written.
+    is readable, or `out` exists or cannot be written; KeyboardInterrupt, and nothing written, once
+    `interrupted()`.
     """
     path = find_bag(path)
     files = mcap_files(path)
@@ -98,7 +102,7 @@ def recover(path: Path, out: Path) -> Recovery | None:
         except BagError as error:
             there = (path / METADATA_FILE).exists()
             losses.append(Loss(METADATA_FILE, 0, 0, str(error) if there else "it is missing"))
-    found = [_look(file) for file in files]
+    found = [_look(file, interrupted) for file in files]
     losses += [loss for file in found for loss in file.losses]
     if not losses:
         return None
@@ -116,11 +120,11 @@ def recover(path: Path, out: Path) -> Recovery | None:
     for file in found:
         custom = file.custom | custom
     custom[RECOVERED] = json.dumps(recovery.as_json())
-    _write_bag(out, found, custom)
+    _write_bag(out, found, custom, interrupted)
     return recovery
 
 
-def _look(path: Path) -> _Found:
+def _look(path: Path, interrupted: Callable[[], bool]) -> _Found:
     """Walk a file for its topics, its texts and its losses."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
@@ -129,7 +133,7 @@ def _look(path: Path) -> _Found:
     losses: list[Loss] = []
     counted, unpackable, more = None, 0, 0
     with PlainFile(path) as file:
-        for piece in scan(file):
+        for piece in until(interrupted, scan(file)):
             if isinstance(piece, Schema):
                 schemas[piece.id] = piece
             elif isinstance(piece, Channel):
@@ -177,13 +181,18 @@ def _unpacked(body: bytes, room: Room) -> bytes | None:
         return None
 
 
-def _write_bag(out: Path, found: Sequence[_Found], custom: dict[str, str]) -> None:
+def _write_bag(
+    out: Path,
+    found: Sequence[_Found],
+    custom: dict[str, str],
+    interrupted: Callable[[], bool],
+) -> None:
     if out.exists():
         raise BagError(f"{out} exists already: choose another --out")
     try:
         out.mkdir(parents=True)
         try:
-            files = [_write_file(out / file.name, file, custom) for file in found]
+            files = [_write_file(out / file.name, file, custom, interrupted) for file in found]
             write_metadata(out, bag_metadata(files, custom))
         except BaseException:
             shutil.rmtree(out)  # it was begun here
@@ -192,14 +201,16 @@ def _write_bag(out: Path, found: Sequence[_Found], custom: dict[str, str]) -> No
         raise BagError(f"cannot write a bag to {out}: {error.strerror}") from error
 
 
-def _write_file(path: Path, found: _Found, custom: dict[str, str]) -> BagFile:
+def _write_file(
+    path: Path, found: _Found, custom: dict[str, str], interrupted: Callable[[], bool]
+) -> BagFile:
     file = McapFile(path, f"ahv {version('ahv')}")
     for schema in found.schemas.values():
         file.add_schema(schema)
     for channel in found.channels.values():
         file.add_channel(channel)
     with PlainFile(found.path) as source:
-        for piece in scan(source):
+        for piece in until(interrupted, scan(source)):
             if isinstance(piece, Block):
                 for records, index in _chunks(piece, found.channels, source.room):
                     file.add_chunk(records, index)

@@ -8,6 +8,7 @@ bag of another recorder has no such numbers: there two messages that differ and 
 cannot be told apart, and the bag is refused.
 """
 
+from array import array
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -15,21 +16,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ahv_analysis.bag.rows import BLOCK, Array, GrowingRows, Rows, bits_differ, part_of
 from ahv_msgs_py.layout import NANOSECONDS, MessageError
 from ahv_msgs_py.node.faults import PERIOD, Fault
 from ahv_msgs_py.node.guard import refusal
 from ahv_msgs_py.topics import STATE, LoopTopic
 
-Array = NDArray[np.float64]
 MOST_PUBLISHERS = 100  # of one topic; what counts messages numbers no publishers
-_FIRST = 16  # messages for which there is room at first
 
 
 class Series(NamedTuple):
     """What was obeyed of a topic."""
 
     stamps: NDArray[np.int64]  # (n,) [ns] rising
-    values: Array  # (n, fields)
+    values: Rows  # (n, fields)
 
 
 class Refused(NamedTuple):
@@ -43,25 +43,6 @@ class Refused(NamedTuple):
 
 class AmbiguousError(ValueError):
     """Messages of which nobody can tell which was obeyed."""
-
-
-class _Growing:
-    """Rows that come in portions, in one array that never exists twice."""
-
-    def __init__(self, dtype: str, width: int):
-        self._data = np.empty((_FIRST, width), dtype)
-        self._size = 0
-
-    def extend(self, rows: NDArray) -> None:
-        needed = self._size + len(rows)
-        if needed > len(self._data):
-            self._data.resize((needed + needed // 4, self._data.shape[1]), refcheck=False)
-        self._data[self._size : needed] = rows.reshape(len(rows), self._data.shape[1])
-        self._size = needed
-
-    def rows(self) -> NDArray:
-        self._data.resize((self._size, self._data.shape[1]), refcheck=False)
-        return self._data
 
 
 def _told_apart(publishers: NDArray[np.uint32]) -> bool:
@@ -98,9 +79,8 @@ class Collector:
         self._topic, self._name = topic, name
         self._general = general
         self._low, self._high = np.array(topic.bounds).T
-        self._stamps = _Growing("i8", 1)
-        self._values = _Growing("f8", len(topic.layout.fields))
-        self._publishers = _Growing("u4", 1)
+        self._stamps, self._publishers = array("q"), array("I")
+        self._values = GrowingRows(len(topic.layout.fields))
         self._counts: Counter[Fault] = Counter()
         self._firsts: dict[Fault, str] = {}
 
@@ -131,9 +111,9 @@ class Collector:
             refused = refusal(self._topic, stamp, tuple(values[place].tolist()))
             assert refused is not None
             self._refuse(refused.fault, 1, f"{refused} at {stamp / NANOSECONDS:g} s")
-        self._stamps.extend(stamps[good])
+        self._stamps.frombytes(stamps[good].tobytes())
         self._values.extend(values[good])
-        self._publishers.extend(publishers[good])
+        self._publishers.frombytes(publishers[good].tobytes())
 
     def _refuse(self, fault: Fault, messages: int, text: str) -> None:
         self._counts[fault] += messages
@@ -141,8 +121,9 @@ class Collector:
 
     def series(self) -> Series:
         """What was obeyed; AmbiguousError where that cannot be told. The collector is used up."""
-        stamps, values = self._stamps.rows()[:, 0], self._values.rows()
-        publishers = self._publishers.rows()[:, 0]
+        stamps = np.frombuffer(self._stamps, np.int64)
+        publishers = np.frombuffer(self._publishers, np.uint32)
+        values = self._values.rows()
         if np.all(publishers == publishers[:1]) and np.all(stamps[1:] > stamps[:-1]):
             return Series(stamps, values)
         told = _told_apart(publishers)
@@ -152,26 +133,28 @@ class Collector:
             if len(others):
                 when = others[0] / NANOSECONDS
                 self._refuse(Fault.SECOND_PUBLISHER, len(others), f"from {when:g} s on")
-            stamps, values = stamps[heard], values[heard]
+            stamps, values = stamps[heard], part_of(values, np.flatnonzero(heard))
             if self._topic is STATE and np.any((stamps[1:] == 0) & (stamps[:-1] > 0)):
                 raise AmbiguousError(f"{self._name} starts again at 0 s")
         order = np.argsort(stamps, kind="stable")
-        stamps, values = stamps[order], values[order]
+        stamps, values = stamps[order], part_of(values, order)
         first = np.append(True, stamps[1:] > stamps[:-1])[: len(stamps)]
         again = int(np.count_nonzero(~first))
         if told and again:
             when = stamps[np.argmin(first)] / NANOSECONDS
             self._refuse(Fault.DUPLICATE, again, f"another one of {when:g} s")
         elif again:
-            bits = values.view(np.uint64)
-            standing = bits[first][np.cumsum(first) - 1]  # what stands at the stamp of each
-            differ = np.any(bits != standing, axis=1)
-            if np.any(differ):
-                when = stamps[np.argmax(differ)] / NANOSECONDS
-                raise AmbiguousError(
-                    f"two messages on {self._name} differ and have one stamp, {when:g} s"
-                )
-        return Series(stamps[first], values[first])
+            others = np.flatnonzero(~first)
+            standing = np.flatnonzero(first)[np.cumsum(first)[others] - 1]  # at the stamp of each
+            for start in range(0, again, BLOCK):
+                some = slice(start, start + BLOCK)
+                differ = bits_differ(values[others[some]], values[standing[some]]).any(axis=1)
+                if np.any(differ):
+                    when = stamps[others[some][np.argmax(differ)]] / NANOSECONDS
+                    raise AmbiguousError(
+                        f"two messages on {self._name} differ and have one stamp, {when:g} s"
+                    )
+        return Series(stamps[first], part_of(values, np.flatnonzero(first)))
 
     @property
     def refused(self) -> list[Refused]:

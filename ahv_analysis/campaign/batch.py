@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from ahv_analysis.bag.record import Array, FlightRecord
+from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.flight.case import Case
 from ahv_analysis.flight.closed_loop import loop_step, start_loop
 from ahv_analysis.flight.outcome import START, Outcome, next_outcome

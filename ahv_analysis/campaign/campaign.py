@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ahv_analysis.bag.record import Array
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.campaign.batch import find_trims, fly_alone, fly_batch
 from ahv_analysis.campaign.store import (
     PART_RUNS,
@@ -290,6 +290,11 @@ def open_campaign(folder: Path, level: float | None = None) -> Campaign:
     if not files:
         raise CampaignError(f"{found[chosen[0]]} holds no runs of a campaign")
     last, described = read_part(files[-1], ["run"])
+    if level_name(described["level"]) != chosen[0]:
+        raise CampaignError(
+            f"{found[chosen[0]]} holds runs of level {described['level']}: "
+            f"its name was runs-{level_name(described['level'])}"
+        )
     return _campaign_of(described, int(last["run"][-1]) + 1)
 
 

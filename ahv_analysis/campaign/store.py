@@ -18,14 +18,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ahv_analysis.bag.record import Array
+from ahv_analysis.bag.notes import json_object, names_a_case
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.flight.outcome import Cause
-from ahv_plant.dispersion import Dispersion
+from ahv_msgs_py.layout import excerpt
+from ahv_plant.dispersion import HIGHEST_LEVEL, Dispersion
 from ahv_plant.model.constants import DEGREES
 
 PART_RUNS = 2048  # of a file: some seconds of work and half a megabyte
-DESCRIBED = {"source", "case", "level", "seed", "random_starts", "parameters"}
+LONGEST_REASON = 500  # characters that are quoted of a library's
 CHECKSUM = b"ahv_checksum"
 Columns = dict[str, Array]
 
@@ -74,6 +76,11 @@ PLAUSIBLE = {
     "trim_exists": (False, True),
     "trim_alpha_deg": (-90.0, 90.0),  # where one exists
 }
+TYPES = dict.fromkeys(("run", *PLAUSIBLE), "double") | {
+    "run": "int64",
+    "cause": "int64",
+    "trim_exists": "bool",
+}
 
 
 def read_part(path: Path, names: Sequence[str] | None = None) -> tuple[Columns, dict[str, Any]]:
@@ -82,23 +89,53 @@ def read_part(path: Path, names: Sequence[str] | None = None) -> tuple[Columns, 
     All of the file is looked at, whatever is asked for, so that no damage goes unnoticed.
     """
     try:
-        table = pq.read_table(path, page_checksum_verification=True)
-        text = table.schema.metadata[b"ahv"]
-        description = json.loads(text)
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            _check_size(file)
+            table = file.read()
+        if any(column.null_count for column in table.columns):
+            raise ValueError("it has no value in some places")
+        metadata = table.schema.metadata or {}
+        text = metadata.get(b"ahv", b"")
+        description = _description(text)
         columns = {name: table[name].to_numpy() for name in table.column_names}
-        if not set(description) >= DESCRIBED:
-            raise ValueError("it lacks the description")
-        checksum = table.schema.metadata.get(CHECKSUM)
+        checksum = metadata.get(CHECKSUM)
         if checksum not in (None, _checksum(text, columns["run"])):  # None: of an older campaign
             raise ValueError("its description or its number of runs has changed")
         check_columns(columns, int(path.stem.removeprefix("part-")))
-    except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
+    except (OSError, pa.ArrowException, ValueError) as error:
+        reason = " ".join(str(error).split())[:LONGEST_REASON]
         raise CampaignError(
             f"{path} is not the file of a campaign, or is damaged ({reason}): "
             "delete it and run again, and its runs are flown anew"
         ) from error
     return {name: columns[name] for name in names or columns}, description
+
+
+def _check_size(file: pq.ParquetFile) -> None:
+    """Raise ValueError where a file is no part, before it is read: it may claim any size."""
+    if not 0 < file.metadata.num_rows <= PART_RUNS:
+        raise ValueError(f"it has {file.metadata.num_rows} rows, and not 1 to {PART_RUNS}")
+    found = [(field.name, str(field.type)) for field in file.schema_arrow]
+    wrong = sorted({*found} ^ {*TYPES.items()})
+    if wrong or len(found) != len(TYPES):
+        raise ValueError(f"its columns are others, as {excerpt(str((wrong or found)[0]))}")
+
+
+def _description(text: bytes) -> dict[str, Any]:
+    """Description of a campaign; ValueError if the text is none."""
+    content = json_object(text.decode())
+    level, seed = content.get("level"), content.get("seed")
+    if not (
+        names_a_case(content)
+        and type(level) in (int, float)
+        and 0.0 <= level <= HIGHEST_LEVEL
+        and type(seed) is int
+        and seed >= 0
+        and isinstance(content.get("random_starts"), bool)
+        and "source" in content
+    ):
+        raise ValueError("it lacks the description")
+    return content
 
 
 def _checksum(text: bytes, runs: Array) -> bytes:
@@ -146,8 +183,9 @@ def read_parts(
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     """What two descriptions do not have in common, in words; empty if nothing."""
     return ", ".join(
-        name if isinstance(value, Mapping) else f"{name} {there.get(name)} there and {value} here"
+        name if isinstance(value, Mapping) else f"{name} {found} there and {value} here"
         for name, value in here.items()
+        for found in [excerpt(str(there.get(name)))[1:-1]]
         if there.get(name) != value
     )
 

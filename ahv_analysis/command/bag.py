@@ -1,8 +1,11 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The commands `ahv bag`: what a bag holds, recovering a damaged one, exporting it."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import IO, Annotated, Any
 
 import typer
 
@@ -13,7 +16,7 @@ from ahv_analysis.command.console import (
     show_table,
 )
 from ahv_analysis.errors import BagError
-from ahv_analysis.interrupt import signals_wait
+from ahv_analysis.interrupt import signals_wait, until
 
 bag = typer.Typer(
     help="Look into the bag of a flight, recover it, export it.",
@@ -93,8 +96,8 @@ def recover(
     from ahv_analysis.bag.recovery import recover as write_recovered
 
     target = out or path.with_name(f"{path.name.partition('.mcap')[0]}-recovered")
-    with signals_wait():
-        recovery = write_recovered(path, target)
+    with signals_wait() as interrupted:
+        recovery = write_recovered(path, target, interrupted)
     facts: dict[str, Any] = {"source": str(path), "recovered": None}
     if recovery is not None:
         flight = _flight(target)
@@ -159,30 +162,34 @@ def export(
     for file in files.values():
         if file.exists():
             raise UsageError(f"{file} exists already: choose another file")
-    from ahv_analysis.bag.dataset import EXPORTS, bag_dataset
+    from ahv_analysis.bag.dataset import EXPORTS, bag_parts
+    from ahv_analysis.bag.reader import flight_of, read
 
-    flight = bag_dataset(path)
+    held = read(path)
+    samples, signals = len(flight_of(held).stamps), len(next(bag_parts(held)).data_vars)
     for kind, file in files.items():
-        content = EXPORTS[kind](flight)
         try:
-            with signals_wait():
-                _write_new(file, content)
+            with signals_wait() as interrupted, _new_file(file) as sink:
+                EXPORTS[kind](until(interrupted, bag_parts(held)), sink)
         except OSError as error:
             raise UsageError(f"cannot write {file}: {error.strerror}") from error
     if as_json:
-        facts = {"signals": len(flight.data_vars), "samples": flight.sizes["time"]}
+        facts = {"signals": signals, "samples": samples}
         print_json({"bag": str(path), "files": {k: str(f) for k, f in files.items()}, **facts})
     else:
         for file in files.values():
-            print(f"{flight.sizes['time']} samples of {len(flight.data_vars)} signals in {file}")
+            print(f"{samples} samples of {signals} signals in {file}")
 
 
-def _write_new(file: Path, content: bytes) -> None:
-    """Write a file that does not exist; leave none behind that is cut off."""
-    with file.open("xb") as sink:
-        try:
-            sink.write(content)
-            sink.flush()
-        except OSError:
-            file.unlink()
-            raise
+@contextmanager
+def _new_file(file: Path) -> Iterator[IO[bytes]]:
+    """Write a file that does not exist: it is there once all of it is, or not at all."""
+    draft = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        with draft.open("xb") as sink:
+            yield sink
+        file.open("xb").close()  # nothing is written over
+        draft.replace(file)
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise

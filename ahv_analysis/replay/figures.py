@@ -7,11 +7,13 @@ import numpy as np
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
-from ahv_analysis.bag.record import Array
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.bag.series import Series
 from ahv_analysis.quantities import Quantity, of_topic
 from ahv_analysis.replay.inputs import Recording
 from ahv_analysis.replay.replay import Replay
+from ahv_analysis.replay.result import Stamps, common_stamps
+from ahv_analysis.report.drawn import drawn, drawn_time
 from ahv_analysis.report.figures import STYLE, Plate
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import (
@@ -60,9 +62,8 @@ def draw_replay(
     replayed: Series,
 ) -> Figure:
     """Draw commands over time: on the left both, on the right replayed less recorded."""
-    common, before_at, after_at = np.intersect1d(
-        recorded.stamps, replayed.stamps, assume_unique=True, return_indices=True
-    )
+    common = common_stamps(recorded.stamps, replayed.stamps)
+    times = [stamps / NANOSECONDS for stamps in (recorded.stamps, replayed.stamps, common)]
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(
             len(quantities),
@@ -74,15 +75,19 @@ def draw_replay(
         )
         for one, (both, between) in zip(quantities, axes, strict=True):
             before, after = _column(recorded, one), _column(replayed, one)
+            difference = _at(common, replayed, after) - _at(common, recorded, before)
+            lines = (before, after, difference)
+            before, after, difference = (
+                (drawn_time(time), drawn(time, values))
+                for time, values in zip(times, lines, strict=True)
+            )
             both.plot(*before, color="0.55", linewidth=2.4, label="recorded")
             both.plot(*after, color="C0", linewidth=1.1, label="replayed")
-            between.plot(
-                common / NANOSECONDS, after[1][after_at] - before[1][before_at], color="C3"
-            )
+            between.plot(*difference, color="C3")
             both.set_ylabel(one.label())
-            drawn = np.concatenate((before[1], after[1]))
-            if np.ptp(drawn) < ROUNDING:
-                both.set_ylim(drawn[0] - 1.0, drawn[0] + 1.0)
+            seen = np.concatenate((before[1], after[1]))
+            if np.nanmax(seen) - np.nanmin(seen) < ROUNDING:
+                both.set_ylim(seen[0] - 1.0, seen[0] + 1.0)
             for axis in (both, between):
                 axis.margins(x=0)
                 axis.ticklabel_format(useOffset=False)
@@ -98,6 +103,11 @@ def draw_replay(
     return figure
 
 
-def _column(series: Series, one: Quantity) -> tuple[Array, Array]:
-    """Time [s] and values of a quantity, in the unit for people."""
-    return series.stamps / NANOSECONDS, one.shown_values(series.values[:, one.index])
+def _at(common: Stamps, series: Series, values: Array) -> Array:
+    """Those of the values (n,) of a series that are at `common` stamps."""
+    return values[np.searchsorted(series.stamps, common)]
+
+
+def _column(series: Series, one: Quantity) -> Array:
+    """Values of a quantity, in the unit for people."""
+    return one.shown_values(series.values[:, one.index])

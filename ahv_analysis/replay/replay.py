@@ -21,18 +21,18 @@ from typing import NamedTuple
 
 import numpy as np
 import rclpy
-from numpy.typing import NDArray
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 
+from ahv_analysis.bag.rows import GrowingRows, one_by_one, part_of
 from ahv_analysis.bag.series import Series
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.flight.case import Case
 from ahv_analysis.interrupt import signals_wait
 from ahv_analysis.replay.inputs import LEARNER_NODE, Change, Recording
-from ahv_analysis.replay.result import Comparison, compare
+from ahv_analysis.replay.result import Comparison, Stamps, common_stamps, compare
 from ahv_msgs_py.graph import NODES
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.namespace import ros_arguments
@@ -59,6 +59,7 @@ from ahv_plant.model.constants import STEP_NS
 
 REPLAYED = "/replay"  # before the names of the topics of replayed nodes
 BATCH = 100  # steps that are fed before the answers are waited for
+DEPTH = 2 * BATCH  # messages that a sender keeps: more than are ever on their way
 LISTEN = 1.0  # [s] for other graphs, before anything is said where they could hear it
 LONGEST_SILENCE = 10.0  # [s] without an answer, after which the graph has failed
 LOOK = 0.2  # [s] between looks at the progress
@@ -69,28 +70,25 @@ def answers(name: str) -> list[LoopTopic]:
     return [BY_NAME[topic] for topic in NODES[name].sends]
 
 
-Stamps = NDArray[np.int64]  # (n,) [ns] rising
-
-
 class Answers:
-    """What a node commands on a topic, as it comes: eight bytes a number."""
+    """What a node commands on a topic, as it comes."""
 
     def __init__(self, topic: LoopTopic):
         """Begin with nothing."""
-        self._width = len(topic.layout.fields)
-        self._stamps, self._values = array("q"), array("d")
+        self._stamps, self._values = array("q"), GrowingRows(len(topic.layout.fields))
 
     def append(self, stamp: int, values: Values) -> None:
         """Take one command at `stamp` [ns]."""
         self._stamps.append(stamp)
-        self._values.extend(values)
+        self._values.append(values)
 
     def series(self) -> Series:
         """All of them in the order of their stamps; of two with one stamp the last."""
-        stamps = np.frombuffer(self._stamps, np.int64)[::-1]
-        values = np.frombuffer(self._values).reshape(-1, self._width)[::-1]
-        stamps, last = np.unique(stamps, return_index=True)
-        return Series(stamps, values[last])
+        stamps = np.frombuffer(self._stamps, np.int64)
+        if np.all(stamps[1:] > stamps[:-1]):
+            return Series(stamps, self._values.rows())
+        unique, last = np.unique(stamps[::-1], return_index=True)
+        return Series(unique, part_of(self._values.rows(), len(stamps) - 1 - last))
 
 
 def _union(stamps: Iterable[Stamps]) -> Stamps:
@@ -208,6 +206,7 @@ class _Graph:
         self._nodes: dict[str, BaseNode] = {}
         for name in names:
             self._nodes[name] = NODES[name].node_class(case.parameters[name], context)
+            self._nodes[name].sender_depth = DEPTH
 
     def _name(self, topic: LoopTopic) -> str:
         """Name of a topic where the recorded vehicle flew."""
@@ -231,7 +230,7 @@ class _Graph:
                 message_class(topic.layout.type_name),
                 moved + self._name(topic),
                 partial(self._take, topic),
-                quality(durable=True),
+                quality(durable=True, depth=DEPTH),
                 raw=True,
             )
         for name, node in self._nodes.items():
@@ -255,7 +254,7 @@ class _Graph:
         states = self._stamps(STATE)
         common = states
         for topic in inputs:
-            common = np.intersect1d(common, self._stamps(topic), assume_unique=True)
+            common = common_stamps(common, self._stamps(topic))
         if name == LEARNER_NODE:  # learns from the step before; starts at any state
             later = np.intersect1d(common + STEP_NS, states, assume_unique=True)
             common = np.union1d(states[:1], later)
@@ -286,12 +285,17 @@ class _Graph:
         """Publish the recording in the order of its stamps, at `rate` or as fast as possible."""
         publish = {
             topic: self._feeder.create_publisher(
-                message_class(topic.layout.type_name), self._name(topic), quality(durable=True)
+                message_class(topic.layout.type_name),
+                self._name(topic),
+                quality(durable=True, depth=DEPTH),
             ).publish
             for topic in self._recording.topics
         }
         changes = list(self._recording.changes)
         following = dict.fromkeys(publish, 0)  # place of the message of every topic that is next
+        rows = {
+            topic: one_by_one(series.values) for topic, series in self._recording.topics.items()
+        }
         started = time.monotonic()
         for number, stamp in enumerate(map(int, self.steps)):
             if rate is not None:
@@ -306,10 +310,10 @@ class _Graph:
                 return
             while changes and changes[0].stamp <= stamp:
                 self._change(changes.pop(0))
-            for topic, (stamps, values) in self._recording.topics.items():
+            for topic, (stamps, _) in self._recording.topics.items():
                 place = following[topic]
                 if place < len(stamps) and stamps[place] == stamp:
-                    publish[topic](topic.layout.encode(stamp, values[place].tolist()))
+                    publish[topic](topic.layout.encode(stamp, next(rows[topic])))
                     following[topic] += 1
         self._await_answers(int(self.steps[-1]) + 1)
         progress(len(self.steps))

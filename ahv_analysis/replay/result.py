@@ -7,9 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ahv_analysis.bag.rows import BLOCK, bits_differ
 from ahv_analysis.bag.series import Series
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import LoopTopic
+
+Stamps = NDArray[np.int64]  # (n,) [ns] rising
 
 
 class Difference(NamedTuple):
@@ -54,52 +57,65 @@ class Comparison(NamedTuple):
     largest: Difference | None
 
 
+def common_stamps(one: Stamps, other: Stamps) -> Stamps:
+    """Stamps that both have."""
+    if np.array_equal(one, other):
+        return one
+    return np.intersect1d(one, other, assume_unique=True)
+
+
 def compare(
     node: str,
     topic: LoopTopic,
     name: str,
     recorded: Series | None,
     replayed: Series,
-    complete: NDArray[np.int64],
+    complete: Stamps,
 ) -> Comparison:
     """Compare what `node` commanded on `topic`, in the bag as `name`, by stamp [ns], bit for bit.
 
     `recorded` is None if the bag does not have the topic; `complete` are the stamps of the steps
     that the node had all inputs of.
     """
-    first = largest = None
+    first: Difference | None = None
+    largest: Difference | None = None
     differing = 0
     known = np.empty(0, np.int64) if recorded is None else recorded.stamps
-    common = np.intersect1d(known, replayed.stamps, assume_unique=True)
-    if recorded is not None and len(common):
-        before = recorded.values[np.searchsorted(known, common)]
-        after = replayed.values[np.searchsorted(replayed.stamps, common)]
-        unlike = before.view(np.uint64) != after.view(np.uint64)
-        differing = int(np.count_nonzero(unlike.any(axis=1)))
-        if differing:
-            sizes = np.where(unlike, np.abs(after - before), -1.0)
-            first, largest = (
-                Difference(
-                    int(common[row]),
-                    node,
-                    name,
-                    topic.layout.fields[column],
-                    float(before[row, column]),
-                    float(after[row, column]),
-                )
-                for row, column in (
-                    np.unravel_index(flat, unlike.shape)
-                    for flat in (np.argmax(unlike), np.argmax(sizes))
-                )
+    common = common_stamps(known, replayed.stamps)
+    for start in range(0, len(common) if recorded is not None else 0, BLOCK):
+        stamps = common[start : start + BLOCK]
+        before = recorded.values[np.searchsorted(known, stamps)]
+        after = replayed.values[np.searchsorted(replayed.stamps, stamps)]
+        unlike = bits_differ(before, after)
+        if not unlike.any():
+            continue
+        differing += int(np.count_nonzero(unlike.any(axis=1)))
+        sizes = np.where(unlike, np.abs(after - before), -1.0)
+        earliest, greatest = (
+            Difference(
+                int(stamps[row]),
+                node,
+                name,
+                topic.layout.fields[column],
+                float(before[row, column]),
+                float(after[row, column]),
             )
+            for row, column in (
+                np.unravel_index(flat, unlike.shape)
+                for flat in (np.argmax(unlike), np.argmax(sizes))
+            )
+        )
+        first = first or earliest
+        if largest is None or abs(greatest.size) > abs(largest.size):
+            largest = greatest
     return Comparison(
         node,
         name,
         recorded is not None,
         len(common),
         differing,
-        len(np.setdiff1d(np.intersect1d(known, complete), replayed.stamps)),
-        len(np.setdiff1d(replayed.stamps, known)) if len(known) else 0,
+        len(np.setdiff1d(common_stamps(known, complete), common, assume_unique=True)),
+        len(replayed.stamps) - len(common) if len(known) else 0,
         first,
         largest,
     )

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ahv_analysis.bag.record import Array
+from ahv_analysis.bag.rows import Array
 from ahv_plant.model.constants import STEP
 
 FULL = 20_000  # samples of a line up to which every one is drawn: 200 s

@@ -12,7 +12,8 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
-from ahv_analysis.bag.record import Array, FlightRecord
+from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.interrupt import signals_wait
 from ahv_analysis.quantities import Quantity, of_plate
 from ahv_analysis.report.drawn import drawn, drawn_time

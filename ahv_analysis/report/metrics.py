@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ahv_analysis.bag.record import Array, FlightRecord
+from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.flight.case import Case
 from ahv_analysis.quantities import AXES, CONTROLS, TRACKED, Settings
 from ahv_plant.model.constants import DEGREES, STEP, STEP_NS, UNSTART_ALPHA

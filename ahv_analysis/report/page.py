@@ -14,7 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib import pyplot
 
 from ahv_analysis.bag.info import refused_words
-from ahv_analysis.bag.record import Array
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.quantities import AXES, CONTROLS, TRACKED, Quantity, of_group
 from ahv_analysis.report.drawn import EXACT, drawn, drawn_time, thinned_to
 from ahv_analysis.report.page_figures import flight_figures

@@ -7,6 +7,7 @@ import numpy as np
 
 from ahv_analysis.bag.reader import Bag
 from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.rows import BLOCK
 from ahv_analysis.flight.outcome import Cause, first_cause
 from ahv_analysis.report.metrics import fuel, margins
 from ahv_msgs_py.topics import STATE
@@ -32,7 +33,7 @@ def summarize(record: FlightRecord, ended_early: str, missing: int = 0) -> dict[
     Success is that of a campaign, and of Table 5.1: flown to the end with |alpha| <= 5 deg
     throughout and surfaces that turn the vehicle; and the record has to show all of that.
     """
-    surfaces = record.surfaces * DEGREES
+    surfaces = record.surfaces[:] * DEGREES
     angles = margins(record)
     cause = failure(record, ended_early).name.lower()
     if cause == Cause.SUCCESS.name.lower() and missing:
@@ -56,9 +57,11 @@ def failure(record: FlightRecord, ended_early: str) -> Cause:
     """Return the first cause of failure of a flight, by the rule of the campaigns' outcome."""
     lost_at = record.surfaces_lost_at
     lost = len(record.stamps) if lost_at is None else int(np.searchsorted(record.stamps, lost_at))
-    cause = Cause(int(first_cause(np.ascontiguousarray(record.states), lost, record.geometric)))
-    if cause != Cause.SUCCESS:
-        return cause
+    for start in range(0, len(record.stamps), BLOCK):
+        states = np.ascontiguousarray(record.states[start : start + BLOCK])
+        cause = Cause(int(first_cause(states, lost - start, record.geometric)))
+        if cause != Cause.SUCCESS:
+            return cause
     # the state that ended a flight is not in its record
     words = {
         left.name.lower().replace("_", " "): Cause[left.name] for left in list(Termination)[1:]
