@@ -275,7 +275,7 @@ def test_launch_puts_a_vehicle_into_a_namespace_with_a_clock_of_its_own(launch, 
     case = tmp_path / "case.yaml"
     case.write_text("/ahv/plant: {ros__parameters: {duration: 3.0}}")
     assert launch(case=str(case))
-    with pytest.raises(ParameterError, match=r"no node '/ahv/plant'; valid are"):
+    with pytest.raises(ParameterError, match=r"no node '/ahv/plant'; did you mean '/uav1/plant'"):
         launch(case=str(case), namespace="/uav1")
 
 
