@@ -7,8 +7,8 @@ from ahv_plant.model.vectors import State, Surfaces, limit_surfaces
 
 SAFE_THROTTLE = 0.194  # [-] section 3.5.1: level flight, until the first command comes
 # An elevon moves the pitch rate of the trimmed vehicle by 0.70 1/s^2 per radian, and what is off
-# trim doubles in 0.65 s: by 1.13 1/s^2 times itself. These bring it to 2 rad/s, damped by 0.7; 1 and
-# 3 rad/s keep the same vehicles, as do half and twice the gains.
+# trim doubles in 0.65 s: by 1.13 1/s^2 times itself. These bring it to 2 rad/s, damped by 0.7; 1
+# and 3 rad/s keep the same vehicles, as do half and twice the gains.
 ALPHA_GAIN = 7.3  # [-] elevon per angle of attack
 RATE_GAIN = 4.0  # [s] elevon per pitch rate
 

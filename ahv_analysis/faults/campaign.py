@@ -196,6 +196,8 @@ class Spectator(Liar):
             self._interrupted = lambda: False
             for subscription in subscriptions:
                 self._node.destroy_subscription(subscription)
+            while self._voices:  # or the next plant refuses to fly: a command has two publishers
+                self._node.destroy_publisher(self._voices.popitem()[1])
 
     def _hear(self, name: str, data: bytes) -> None:
         known = BY_NAME[name].layout.decode(data)

@@ -62,12 +62,16 @@ def _twin(folder: Path) -> Iterator[dict[str, str]]:
     parameters = config_folder() / "cases" / f"{CASE}.yaml"
     code = f"from {node.module} import main; main()"
     options = ["--ros-args", "--params-file", str(parameters), "-p", "realtime:=true"]
-    twin = subprocess.Popen([sys.executable, "-c", code, *options], stderr=subprocess.DEVNULL)
+    twin = subprocess.Popen(
+        [sys.executable, "-c", code, *options], stderr=subprocess.PIPE, text=True
+    )
+    assert twin.stderr is not None
     try:
+        next(line for line in twin.stderr if line.endswith("active\n"))  # before the flight is
         yield {}
     finally:
         twin.terminate()
-        twin.wait()
+        twin.communicate()
 
 
 def _set_clock(hours: float) -> Callable[[Path], None]:
