@@ -18,7 +18,7 @@ Part = TypeVar("Part")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 CLEAR_LINE_AND_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # after a progress bar
 
-LONGEST_LEAVE = 2.0  # [s] for what is left to the very end
+LONGEST_LEAVE = 2.0  # [s] for what is left to the very end, and for Python to tidy up
 
 _last: list[Callable[[], None]] = []  # to be done when all has been said
 _words: Callable[[], str] = str  # what is to be said of an interrupted command
@@ -84,9 +84,8 @@ def last_of_all(work: Callable[[], None]) -> None:
 
 
 def do_the_last(code: int) -> None:
-    """Do what was left to the end; this process ends with exit code `code` if that takes long."""
-    if _last:
-        end_within(LONGEST_LEAVE, code)
+    """Do what was left to the end; this process ends soon with exit code `code`, come what may."""
+    end_within(LONGEST_LEAVE, code)
     while _last:
         _last.pop()()
 

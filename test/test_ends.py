@@ -105,6 +105,14 @@ def test_a_command_ends_though_the_middleware_hangs(way, tmp_path):
     assert (tmp_path / "summary.json").is_file()
 
 
+def test_a_flight_that_ends_early_has_said_why_when_the_middleware_hangs(tmp_path):
+    """Through a pipe, into which Python writes when it ends and not before."""
+    command = [sys.executable, "-c", HANGS, "nominal_di_dispersed", "--json", "--out", "out"]
+    flown = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, cwd=tmp_path)
+    assert flown.returncode == 1, flown.stderr
+    assert "ended_early" in flown.stdout
+
+
 def test_an_interrupted_command_ends_though_the_middleware_hangs(tmp_path):
     command = [sys.executable, "-c", HANGS, "nominal_di", "--duration", "1000", "--realtime"]
     flown = subprocess.Popen([*command, "--out", tmp_path], stderr=subprocess.PIPE, text=True)

@@ -65,9 +65,12 @@ def errors_in_a_sentence(as_json: bool) -> Iterator[None]:
     What a program does that it should not is not caught.
     """
     try:
-        yield
-        if sys.stdout is not None:  # closed by the shell
-            sys.stdout.flush()
+        try:
+            yield
+        except typer.Exit:  # all is said then too
+            _flush()
+            raise
+        _flush()
     except MISUSE as error:
         if not as_json:
             raise  # with a hint at the help
@@ -81,12 +84,16 @@ def errors_in_a_sentence(as_json: bool) -> Iterator[None]:
         _refuse(str(error), as_json, 1)
 
 
+def _flush() -> None:
+    if sys.stdout is not None:  # closed by the shell
+        sys.stdout.flush()
+
+
 def _refuse(sentence: str, as_json: bool, code: int) -> None:
     try:
         if as_json:
             print_json({"error": sentence})
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        _flush()
     except OSError:  # it is about standard output
         _give_up_output()
         as_json = False
