@@ -154,7 +154,7 @@ def test_the_adaptive_laws_keep_it_and_settle(name):
     assert abs(flight.column("u")[-1] - 1786.4) < 1.0
     assert np.max(np.abs(flight.states[-1000:, 3:6])) * DEGREES < 0.01
     assert abs(flight.climb_angle[-1]) * DEGREES < 0.05
-    surfaces = flight.surfaces * DEGREES
+    surfaces = flight.surfaces[:] * DEGREES
     assert surfaces.min() > -16.0 and surfaces.max() < 1e-6
 
 
@@ -163,7 +163,7 @@ def test_the_hard_vehicle_is_flown_to_the_end_inside_all_limits(name):
     flight, ended_early, _ = flown(name, {f"dispersion.{key}": x for key, x in HARD.items()})
     assert not ended_early and flight.steps == 15000
     assert flight.inlet_started
-    surfaces = flight.surfaces * DEGREES
+    surfaces = flight.surfaces[:] * DEGREES
     assert surfaces.min() > -40.0 and surfaces.max() < 30.0
     errors = (flight.states[:, 3:6] - flight.learner[:, 0:3]) * DEGREES
     assert 0.5 < np.max(np.abs(errors)) < 0.7  # near the barrier, never beyond

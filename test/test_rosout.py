@@ -98,5 +98,6 @@ def test_a_killed_controller_leaves_a_word_on_the_console(domain, monkeypatch):
     )
     assert flown.returncode == 0, flown.stderr
     said = [line.split("[", 1)[1] for line in flown.stderr.splitlines() if "ahv.plant" in line]
-    assert any("late at" in line and "/ahv/throttle_command" in line for line in said), said
+    # of a kind one in five seconds: on a busy machine another command may have been late before
+    assert any(line.startswith("WARN") and "late at" in line for line in said), said
     assert any(line.startswith("ERROR") and "command lost at" in line for line in said), said
