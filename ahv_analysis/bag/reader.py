@@ -142,7 +142,7 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
                     f"does not tell apart: {error}"
                 ) from error
             if len(obeyed.stamps):
-                series[topic] = _sharing(obeyed, series)
+                series[topic] = obeyed.sharing(series.values())
             refused += collector.refused
         elif name in others:
             raise BagError(
@@ -168,14 +168,6 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
         namespace,
         lost_at,
     )
-
-
-def _sharing(found: Series, others: Mapping[LoopTopic, Series]) -> Series:
-    """Messages whose stamps, if they are those of other messages, are in memory once."""
-    for other in others.values():
-        if np.array_equal(found.stamps, other.stamps):
-            return Series(other.stamps, found.values)
-    return found
 
 
 def _namespace(path: Path, topics: Mapping[str, BagTopic]) -> str:

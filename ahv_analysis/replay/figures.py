@@ -63,7 +63,6 @@ def draw_replay(
 ) -> Figure:
     """Draw commands over time: on the left both, on the right replayed less recorded."""
     common = common_stamps(recorded.stamps, replayed.stamps)
-    times = [stamps / NANOSECONDS for stamps in (recorded.stamps, replayed.stamps, common)]
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(
             len(quantities),
@@ -76,10 +75,10 @@ def draw_replay(
         for one, (both, between) in zip(quantities, axes, strict=True):
             before, after = _column(recorded, one), _column(replayed, one)
             difference = _at(common, replayed, after) - _at(common, recorded, before)
-            lines = (before, after, difference)
             before, after, difference = (
-                (drawn_time(time), drawn(time, values))
-                for time, values in zip(times, lines, strict=True)
+                _drawn(recorded.stamps, before),
+                _drawn(replayed.stamps, after),
+                _drawn(common, difference),
             )
             both.plot(*before, color="0.55", linewidth=2.4, label="recorded")
             both.plot(*after, color="C0", linewidth=1.1, label="replayed")
@@ -103,9 +102,15 @@ def draw_replay(
     return figure
 
 
+def _drawn(stamps: Stamps, values: Array) -> tuple[Array, Array]:
+    """Times [s] and values of a line."""
+    time = stamps / NANOSECONDS
+    return drawn_time(time), drawn(time, values)
+
+
 def _at(common: Stamps, series: Series, values: Array) -> Array:
     """Those of the values (n,) of a series that are at `common` stamps."""
-    return values[np.searchsorted(series.stamps, common)]
+    return values if common is series.stamps else values[np.searchsorted(series.stamps, common)]
 
 
 def _column(series: Series, one: Quantity) -> Array:

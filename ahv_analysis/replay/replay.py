@@ -135,7 +135,10 @@ def replay(
             graph.feed(rate, progress, interrupted)
         finally:
             graph.close()
-    commanded = {topic: given.series() for topic, given in graph.answers.items()}
+    commanded = {
+        topic: given.series().sharing(recording.topics.values())
+        for topic, given in graph.answers.items()
+    }
     comparisons = [
         compare(
             name,
