@@ -117,7 +117,10 @@ try:
 except typer.Exit:
     os._exit(1)
 """
-    failed = subprocess.run([sys.executable, "-c", lines], capture_output=True, text=True)
+    buffered = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    failed = subprocess.run(
+        [sys.executable, "-c", lines], capture_output=True, text=True, env=buffered
+    )
     assert failed.stdout == "said\n"
 
 
