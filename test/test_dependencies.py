@@ -195,8 +195,11 @@ def test_rclpy_still_has_what_is_used_of_its_internals():
         if not hasattr(rclpy_implementation, name)
     ]
     source = inspect.getsource(LifecycleNode.__mro__[1])
-    if "_service_change_state" not in source:
-        missing.append("LifecycleNode._service_change_state")
+    missing += [
+        f"LifecycleNode.{name}"
+        for name in ("_service_change_state", "_state_machine")
+        if name not in source
+    ]
     assert not missing, f"rclpy lacks {', '.join(missing)}"
 
 

@@ -2,6 +2,7 @@
 """The graph flies what the library flies, to the last bit, and leaves nothing behind."""
 
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -151,15 +152,20 @@ def test_nominal_flight_is_as_section_3_5_2_describes_it(nominal):
     assert flown.throttle.min() > 0.1 and flown.throttle.max() < 0.9
 
 
+def sockets():
+    return sum(path.is_socket() for path in Path("/proc/self/fd").iterdir())
+
+
 def test_a_graph_leaves_nothing_behind(tmp_path, domain):
     case = load_case("nominal_di", {"duration": 0.2})
     fly_graph(case, None, domain=domain)  # what a process loads once
-    threads = threading.active_count()
+    threads, opened = threading.active_count(), sockets()
     for number in range(3):
         ended_early, _ = fly_graph(case, tmp_path / str(number), domain=domain)
         assert ended_early == ""
         assert read_bag(tmp_path / str(number)).steps == 20
     assert threading.active_count() == threads
+    assert sockets() <= opened  # no participant of the domain stays
     assert not rclpy.ok()  # the default context was never touched
 
 

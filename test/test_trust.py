@@ -10,9 +10,6 @@ from rclpy.executors import SingleThreadedExecutor
 
 from ahv_analysis.bag.reader import load_bag
 from ahv_analysis.bag.recorder_node import RecorderNode
-from ahv_analysis.errors import GraphError
-from ahv_analysis.flight.case import load_case
-from ahv_analysis.flight.one_process import fly_graph
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import quality
@@ -27,6 +24,7 @@ from ahv_msgs_py.topics import (
     STATE,
     SURFACE_COMMAND,
 )
+from ahv_plant.plant_node import PlantNode
 
 
 @contextmanager
@@ -64,14 +62,24 @@ def test_every_message_comes_with_the_gid_of_its_publisher(executor_class, domai
 
 
 def test_a_plant_with_two_publishers_of_a_command_refuses_to_fly(domain):
-    with stranger(domain) as node:
+    with stranger(domain) as node, stranger(domain) as other:
+        plant = PlantNode({"listeners": 1}, other.context)
+        plant.bring_up()
+        executor = EventsExecutor(context=other.context)
+        executor.add_node(plant)
         message_type = message_class(SURFACE_COMMAND.layout.type_name)
-        node.create_publisher(message_type, SURFACE_COMMAND.name, quality(True))
-        while node.count_publishers(SURFACE_COMMAND.name) < 1:
-            pass
-        says = "refused to fly: /ahv/surface_command has 2 publishers"
-        with pytest.raises(GraphError, match=says):
-            fly_graph(load_case("nominal_di", {"duration": 1.0}), None, domain=domain)
+        for _ in range(2):
+            node.create_publisher(message_type, SURFACE_COMMAND.name, quality(True))
+        assert spin(executor, lambda: plant.count_publishers(SURFACE_COMMAND.name) == 2)
+        node.create_subscription(
+            message_class(STATE.layout.type_name), STATE.name, print, quality(True)
+        )
+        assert spin(executor, plant.finished.done)
+        says = "refused to fly: /ahv/surface_command has 2 publishers: end all but one of them"
+        assert plant.finished.result() == says
+        executor.remove_node(plant)
+        executor.shutdown()
+        plant.destroy_node()
 
 
 @pytest.fixture

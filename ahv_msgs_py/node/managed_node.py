@@ -14,7 +14,11 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 from rclpy.timer import Timer
 
-from ahv_msgs_py.node.rclpy_internals import RCLError, change_state_service
+from ahv_msgs_py.node.rclpy_internals import (
+    RCLError,
+    change_state_service,
+    destroy_state_machine,
+)
 from ahv_msgs_py.node.ros_parameters import declare_parameters
 from ahv_msgs_py.node.warm_up import Law, warm_up
 from ahv_msgs_py.parameters import SIMULATED_TIME, Parameter, ParameterError, Value, check_time
@@ -154,6 +158,7 @@ class ManagedNode(LifecycleNode):
         self.conclude()
         self.close()
         super().destroy_node()
+        destroy_state_machine(self)
 
     def _transition(self, after: str, work: Callable[[], None]) -> TransitionCallbackReturn:
         """Do the work of a transition, and log it; rclpy would swallow what it raises.
