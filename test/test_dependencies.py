@@ -215,7 +215,12 @@ def test_laws_know_nothing_of_ros():
 
 # What a room must not reach, not even by a detour: the truth, and the rooms that stand above it.
 OUT_OF_REACH = {
-    "ahv_control": ("ahv_plant.dispersion", "ahv_plant.vehicle", "ahv_plant.plant_node"),
+    "ahv_control": (
+        "ahv_plant.dispersion",
+        "ahv_plant.hardware",
+        "ahv_plant.vehicle",
+        "ahv_plant.plant_node",
+    ),
     "ahv_analysis.bag": ("ahv_analysis.flight", "ahv_plant.dispersion"),
     "ahv_analysis.flight": ("ahv_analysis.campaign", "ahv_analysis.report", "ahv_analysis.faults"),
     "ahv_analysis.campaign": ("ahv_analysis.report", "ahv_analysis.faults"),

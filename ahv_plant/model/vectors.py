@@ -58,6 +58,13 @@ class Surfaces(NamedTuple):
     rudder: float  # [rad] delta_r
 
 
+class Measurement(NamedTuple):
+    """What the flight software is told: state and surface positions as measured."""
+
+    state: State
+    surfaces: Surfaces
+
+
 @elementwise
 def clamp(value: float, lower: float, upper: float) -> float:
     """Limit `value` to what lies between `lower` and `upper`, in any unit."""
