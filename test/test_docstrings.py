@@ -31,6 +31,7 @@ OWN |= {
     "ahv_plant.viewer_pose",
     "ahv_control.held_inputs",
     "ahv_plant.parameters",
+    "ahv_plant.hardware.parameters",
     "ahv_control.parameters",
     "ahv_control.learner_message",
 }
