@@ -284,6 +284,33 @@ def test_a_lane_is_told_the_same_bits_as_its_run_alone(with_air):
         assert told[:, :, run].tobytes() == told_in_flight(run, sensors).tobytes(), run
 
 
+def told_by_numpy(values, normals, sensor):
+    """Readings of one channel, written out once more."""
+    kept = [values[0]]
+    for value in values[1:]:
+        kept.append((1 - sensor.lag) * kept[-1] + sensor.lag * value)
+    told = np.array(kept) * (1 + sensor.scale) + sensor.bias + sensor.noise * normals
+    return np.round(told / sensor.quantum) * sensor.quantum if sensor.quantum else told
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_channel_has_its_own_truth_normals_and_sensor(seed):
+    sensors = drawn_sensors(seed)
+    truths = truths_of(seed).T
+    normals = NoiseStream(1, seed, noisy_channels(sensors)).block(STEPS).T
+    told = told_in_flight(seed, sensors).T
+    for column, sensor in [*enumerate((*sensors.state, *sensors.surfaces))][3:]:
+        expected = told_by_numpy(truths[column], normals[column], sensor)
+        assert told[column] == pytest.approx(expected, abs=1e-9), Channel(100 + column).name
+    true, measured = (
+        (np.arctan2(w, u), np.arctan2(v, np.hypot(u, w)), np.sqrt(u * u + v * v + w * w))
+        for u, v, w in (truths[:3], told[:3])
+    )
+    for column, (name, sensor) in enumerate(sensors.air._asdict().items()):
+        expected = told_by_numpy(true[column], normals[16 + column], sensor)
+        assert measured[column] == pytest.approx(expected, abs=1e-9), name
+
+
 def test_a_flight_is_told_as_it_is_by_perfect_sensors():
     assert told_in_flight(3, sensors_of()).tobytes() == truths_of(3)[:, :16].tobytes()
 
