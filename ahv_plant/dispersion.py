@@ -1,18 +1,22 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""What the real vehicle has and its flight control does not know (sections 4.1 and 4.3).
+"""What the real world has and the flight control does not know (sections 4.1 and 4.3).
 
 Only the plant may import this module; a test sees to it.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from ahv_msgs_py.parameters import ParameterError
-from ahv_plant.model.aerodynamics import Coefficients
+from ahv_plant.hardware.wind import Wind
+from ahv_plant.model.aerodynamics import AirData, Coefficients, Loads
 from ahv_plant.model.mass import Inertia
+from ahv_plant.model.vectors import Surfaces
 from ahv_plant.numerics.elementary import sin_cos
 from ahv_plant.numerics.elementwise import elementwise, select
+from ahv_plant.numerics.optional import changed_by
 
 
 class Dispersion(NamedTuple):
@@ -27,6 +31,28 @@ class Dispersion(NamedTuple):
     Ixx: float = 1.0
     Iyy: float = 1.0
     Izz: float = 1.0
+
+
+class FurtherDispersion(NamedTuple):
+    """Dispersions beyond the report's nine, after Marrison and Stengel (1998).
+
+    Multipliers [-] but for X_cg; as there, each changes what it names and nothing else. So `mass`
+    is that of the vehicle against the one that is known: forces accelerate so many times the
+    state's mass. Inertia and centre of gravity have dispersions of their own, and stay those of
+    the state's mass, within the range of their fits. A vehicle that starts lighter and knows it is
+    another `initial.mass`.
+    """
+
+    mass: float = 1.0
+    X_cg: float = 0.0  # [m] shift aft
+    density: float = 1.0
+    temperature: float = 1.0  # of the speed of sound
+    thrust: float = 1.0  # and with it, by eq 2.6, the fuel flow
+    right_elevon: float = (
+        1.0  # effectiveness: deflects the air like a surface so many times as far
+    )
+    left_elevon: float = 1.0
+    rudder: float = 1.0
 
 
 class AxisDisturbance(NamedTuple):
@@ -54,15 +80,22 @@ class Disturbance(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """The true vehicle, as far as it is not the nominal one."""
+    """The true vehicle and its air, as far as they are not the nominal ones."""
 
     geometric: bool = False  # h is a geometric altitude
     dispersion: Dispersion = Dispersion()
     disturbance: Disturbance | None = None
+    further: FurtherDispersion | None = None
+    wind: Wind | None = None
 
 
 NOMINAL = Truth()
 HIGHEST_LEVEL = 0.9  # [-] of a drawn dispersion
+
+
+def in_calm(truth: Truth) -> Truth:
+    """Without what comes and goes: disturbances and wind, in which no trim is sought."""
+    return truth._replace(disturbance=None, wind=None)
 
 
 def draw_dispersion(level: float, seed: int, run: int) -> Dispersion:
@@ -94,6 +127,57 @@ def disperse_coefficients(nominal: Coefficients, by: Dispersion) -> Coefficients
 def disperse_inertia(nominal: Inertia, by: Dispersion) -> Inertia:
     """True moments of inertia [kg m^2]."""
     return Inertia(nominal.Ixx * by.Ixx, nominal.Iyy * by.Iyy, nominal.Izz * by.Izz)
+
+
+@changed_by
+def disperse_air(nominal: AirData, by: FurtherDispersion) -> AirData:
+    """True air data: density counts in the pressure [Pa], temperature in the Mach number [-]."""
+    return AirData(
+        nominal.speed,
+        nominal.alpha,
+        nominal.beta,
+        nominal.mach / sqrt(by.temperature),
+        nominal.dynamic_pressure * by.density,
+        nominal.sin_alpha,
+        nominal.cos_alpha,
+    )
+
+
+@changed_by
+def disperse_surfaces(surfaces: Surfaces, by: FurtherDispersion) -> Surfaces:
+    """Deflections [rad] of nominal surfaces that do what these do."""
+    return Surfaces(
+        surfaces.right_elevon * by.right_elevon,
+        surfaces.left_elevon * by.left_elevon,
+        surfaces.rudder * by.rudder,
+    )
+
+
+@changed_by
+def disperse_centre(nominal: float, by: FurtherDispersion) -> float:
+    """True X_cg [m]."""
+    return nominal + by.X_cg
+
+
+@changed_by
+def disperse_thrust(nominal: float, by: FurtherDispersion) -> float:
+    """True thrust [N]."""
+    return nominal * by.thrust
+
+
+@changed_by
+def disperse_weight(total: Loads, by: FurtherDispersion) -> Loads:
+    """Loads [N, N m] that move the state's mass as `total` moves the true one, under gravity."""
+    per_mass = 1.0 / by.mass
+    return Loads(
+        total.Fx * per_mass, total.Fy * per_mass, total.Fz * per_mass, total.L, total.M, total.N
+    )
+
+
+@changed_by
+def disperse_throttle(nominal: float, by: FurtherDispersion) -> float:
+    """Throttle [-] that gives the true vehicle what `nominal` would give the nominal one."""
+    return nominal * by.mass / by.thrust
 
 
 @elementwise

@@ -3,7 +3,7 @@
 
 from typing import NamedTuple
 
-from ahv_plant.dispersion import Truth
+from ahv_plant.dispersion import Truth, disperse_throttle
 from ahv_plant.model.constants import (
     MAXIMUM_THRUST,
     SURFACE_MAXIMUM,
@@ -41,7 +41,8 @@ def balance(
         speed, 0.0, speed * sine / cosine, 0.0, 0.0, 0.0, 0.0, alpha, 0.0, 0.0, 0.0, altitude, mass
     )
     rate = state_rate(state, Surfaces(elevon, elevon, 0.0), 0.0, 0.0, truth)
-    return rate.w, rate.Q, -rate.u * mass / MAXIMUM_THRUST
+    throttle = disperse_throttle(-rate.u * mass / MAXIMUM_THRUST, truth.further)
+    return rate.w, rate.Q, throttle
 
 
 @elementwise

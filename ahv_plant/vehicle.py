@@ -3,10 +3,16 @@
 
 from ahv_plant.dispersion import (
     Truth,
+    disperse_air,
+    disperse_centre,
     disperse_coefficients,
     disperse_inertia,
+    disperse_surfaces,
+    disperse_thrust,
+    disperse_weight,
     disturbance_acceleration,
 )
+from ahv_plant.hardware.wind import TurbulentAir, through_air
 from ahv_plant.model.aerodynamics import Loads, aerodynamic_coefficients, air_data, loads
 from ahv_plant.model.constants import GRAVITY, MAXIMUM_THRUST, SPECIFIC_IMPULSE, STEP
 from ahv_plant.model.mass import centre_of_gravity, inertia
@@ -17,20 +23,29 @@ from ahv_plant.numerics.elementwise import elementwise
 
 @elementwise
 def state_rate(
-    state: State, surfaces: Surfaces, throttle: float, time: float, truth: Truth
+    state: State,
+    surfaces: Surfaces,
+    throttle: float,
+    time: float,
+    truth: Truth,
+    turbulence: TurbulentAir | None = None,
 ) -> State:
     """Rates of the 13 states, eqs 2.1-2.14, with surfaces [rad] and sigma_T [-] as they are.
 
-    `truth` is what sets the true vehicle apart from the nominal one, at `time` [s].
+    `truth` is what sets the true vehicle and its air apart from the nominal ones, at `time` [s];
+    `turbulence` is that of the step, if there is any.
     """
-    air = air_data(state, truth.geometric)
-    nominal = aerodynamic_coefficients(air, state, surfaces)
+    further = truth.further
+    moving = through_air(state, time, turbulence, truth.wind)
+    air = disperse_air(air_data(moving, truth.geometric), further)
+    nominal = aerodynamic_coefficients(air, state, disperse_surfaces(surfaces, further))
     coefficients = disperse_coefficients(nominal, truth.dispersion)
-    aero = loads(air, coefficients, centre_of_gravity(state.mass))
-    total = Loads(aero.Fx + throttle * MAXIMUM_THRUST, aero.Fy, aero.Fz, aero.L, aero.M, aero.N)
-    mass_rate = -throttle * MAXIMUM_THRUST / (SPECIFIC_IMPULSE * GRAVITY)  # eq 2.6
+    aero = loads(air, coefficients, disperse_centre(centre_of_gravity(state.mass), further))
+    thrust = disperse_thrust(throttle * MAXIMUM_THRUST, further)
+    total = Loads(aero.Fx + thrust, aero.Fy, aero.Fz, aero.L, aero.M, aero.N)
+    mass_rate = -thrust / (SPECIFIC_IMPULSE * GRAVITY)  # eq 2.6
     body = disperse_inertia(inertia(state.mass), truth.dispersion)
-    rate = motion(state, total, mass_rate, body)
+    rate = motion(state, disperse_weight(total, further), mass_rate, body)
     d_P, d_Q, d_R = disturbance_acceleration(
         truth.disturbance, time, state.P, state.Q, state.R
     )  # eq 4.2
@@ -73,15 +88,23 @@ def along(state: State, rate: State, time: float) -> State:
 
 @elementwise
 def vehicle_step(
-    state: State, surfaces: Surfaces, throttle: float, time: float, truth: Truth
+    state: State,
+    surfaces: Surfaces,
+    throttle: float,
+    time: float,
+    truth: Truth,
+    turbulence: TurbulentAir | None = None,
 ) -> State:
-    """The state 0.01 s after `time` [s]: Runge-Kutta of fourth order, controls held."""
+    """The state 0.01 s after `time` [s]: Runge-Kutta of fourth order.
+
+    Controls and turbulence are held.
+    """
     held = limit_surfaces(surfaces)
     power = limit_throttle(throttle)
     half = 0.5 * STEP
-    k1 = state_rate(state, held, power, time, truth)
-    k2 = state_rate(along(state, k1, half), held, power, time + half, truth)
-    k3 = state_rate(along(state, k2, half), held, power, time + half, truth)
-    k4 = state_rate(along(state, k3, STEP), held, power, time + STEP, truth)
+    k1 = state_rate(state, held, power, time, truth, turbulence)
+    k2 = state_rate(along(state, k1, half), held, power, time + half, truth, turbulence)
+    k3 = state_rate(along(state, k2, half), held, power, time + half, truth, turbulence)
+    k4 = state_rate(along(state, k3, STEP), held, power, time + STEP, truth, turbulence)
     ends = along(along(state, k1, STEP / 6.0), k4, STEP / 6.0)
     return along(along(ends, k2, STEP / 3.0), k3, STEP / 3.0)

@@ -46,7 +46,7 @@ def last_of_flight(state, truth, control, steps):
 @kernel
 def last_of_batch(states, dispersions, like, control, steps, result):
     """Ends of a batch of flights, a row a number."""
-    truth = Truth(False, load(like[1], dispersions), None)
+    truth = Truth(False, load(like[1], dispersions), None, None, None)
     store(result, last_of_flight(load(like[0], states), truth, control, steps))
 
 

@@ -35,14 +35,15 @@ def run_outcome(state, truth, control, steps):
 @kernel
 def batch_outcomes(states, dispersions, like, truth, control, steps, result):
     """Fly a batch of runs: states (13, LANES) and dispersions (9, LANES) to result."""
-    truth = Truth(truth.geometric, load(like[1], dispersions), truth.disturbance)
+    dispersion = load(like[1], dispersions)
+    truth = Truth(truth.geometric, dispersion, truth.disturbance, truth.further, truth.wind)
     store(result, run_outcome(load(like[0], states), truth, control, steps))
 
 
 @kernel
-def trim_batch(dispersions, like, altitude, speed, mass, geometric, result):
+def trim_batch(dispersions, like, altitude, speed, mass, calm, result):
     """Level trims of a batch of vehicles: dispersions (9, LANES) to result (4, LANES)."""
-    truth = Truth(geometric, load(like[1], dispersions), None)
+    truth = Truth(calm.geometric, load(like[1], dispersions), None, calm.further, None)
     store(result, level_trim(altitude, speed, mass, truth))
 
 
@@ -94,7 +95,7 @@ def fly_batch(
 ) -> Array:
     """Outcomes (N, 14) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9).
 
-    Disturbance and kind of altitude are those of `truth`.
+    All else that is true is that of `truth`.
     """
     outcomes = np.empty((len(Outcome._fields), LANES))
     rows = []
@@ -113,14 +114,17 @@ def fly_batch(
 
 
 def find_trims(
-    dispersions: Array, altitude: float, speed: float, mass: float, geometric: bool
+    dispersions: Array, altitude: float, speed: float, mass: float, calm: Truth
 ) -> Array:
-    """Level trims (N, 4) of vehicles with `dispersions` (N, 9), fields of `LevelTrim`."""
+    """Level trims (N, 4) of vehicles with `dispersions` (N, 9), fields of `LevelTrim`.
+
+    Further dispersions and kind of altitude are those of `calm`.
+    """
     trims = np.empty((len(LevelTrim._fields), LANES))
     rows = []
     for first in range(0, len(dispersions), LANES):
         vehicles = _lanes(dispersions, first)
-        trim_batch(vehicles, LIKE, altitude, speed, mass, geometric, trims)
+        trim_batch(vehicles, LIKE, altitude, speed, mass, calm, trims)
         rows.append(trims.T.copy())
     return np.concatenate(rows)[: len(dispersions)]
 

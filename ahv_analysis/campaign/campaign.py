@@ -32,7 +32,7 @@ from ahv_analysis.errors import CampaignError, CampaignStopped
 from ahv_analysis.flight.case import Case, Draw, dispersion_parameters, make_case
 from ahv_analysis.flight.outcome import Outcome
 from ahv_analysis.versions import what_computes
-from ahv_plant.dispersion import Dispersion, draw_dispersion
+from ahv_plant.dispersion import Dispersion, draw_dispersion, in_calm
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
@@ -100,14 +100,14 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     dispersions = np.array([campaign.dispersion(run) for run in runs])
     states = np.array([campaign.start(run) for run in runs])
     case = campaign.case
-    control, geometric = case.control, case.plant.truth.geometric
-    outcomes = fly_batch(states, dispersions, case.plant.truth, control, case.plant.steps)
+    control, (initial, steps, truth) = case.control, case.plant
+    outcomes = fly_batch(states, dispersions, truth, control, steps)
     trims = find_trims(
         dispersions,
         control.outer.altitude,
         control.velocity.speed,
-        case.plant.initial.mass,
-        geometric,
+        initial.mass,
+        in_calm(truth),
     )
     return _columns(np.array(runs), dispersions, states, outcomes, trims)
 
@@ -117,8 +117,8 @@ def fly_again(campaign: Campaign, run: int) -> Columns:
     case = campaign.case_of(run)
     control, (initial, steps, truth) = case.control, case.plant
     outcome = fly_alone(initial, truth, control, steps)
-    calm = truth._replace(disturbance=None)
-    trim = level_trim(control.outer.altitude, control.velocity.speed, initial.mass, calm)
+    altitude, speed = control.outer.altitude, control.velocity.speed
+    trim = level_trim(altitude, speed, initial.mass, in_calm(truth))
     return _columns(*map(np.array, ([run], [truth.dispersion], [initial], [outcome], [trim])))
 
 

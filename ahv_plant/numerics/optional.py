@@ -12,24 +12,43 @@ from typing import Any, TypeVar
 from numba import types
 from numba.extending import overload
 
-from ahv_plant.numerics.elementwise import elementwise
+from ahv_plant.numerics.elementwise import Value, elementwise
 
 Result = TypeVar("Result")
 
 
-def optional(function: Callable[..., Result]) -> Callable[..., Result | None]:
-    """Element-wise `function` that answers None if its last argument, the settings, is None."""
+def optional(
+    function: Callable[..., Result], otherwise: Callable[..., Any] | None = None
+) -> Callable[..., Any]:
+    """Element-wise `function` whose last argument, the settings, may be None.
+
+    Then the answer is that of `otherwise` to all arguments but the last, or None.
+    """
     compiled = elementwise(function)
+    plain = None if otherwise is None else elementwise(otherwise)
 
     @wraps(function)
-    def call(*arguments: Any) -> Result | None:
-        return None if arguments[-1] is None else compiled(*arguments)
+    def call(*arguments: Any) -> Any:
+        if arguments[-1] is not None:
+            return compiled(*arguments)
+        return None if plain is None else plain(*arguments[:-1])
 
     # without forceinline an adaptive flight is a tenth slower
     @overload(call, jit_options={"forceinline": True, "error_model": "numpy"})
     def _compile_call(*arguments):  # type: ignore[no-untyped-def]  # as in elementwise.py
-        if isinstance(arguments[-1], types.NoneType):
+        if not isinstance(arguments[-1], types.NoneType):
+            return lambda *arguments: compiled(*arguments)
+        if plain is None:
             return lambda *arguments: None
-        return lambda *arguments: compiled(*arguments)
+        return lambda *arguments: plain(*arguments[:-1])
 
     return call
+
+
+def changed_by(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Element-wise `function` that answers its first argument as it is if its last is None."""
+    return optional(function, otherwise=_first)
+
+
+def _first(first: Value, *others: object) -> Value:
+    return first
