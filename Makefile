@@ -15,19 +15,27 @@ READY := .venv/ready
 MODULES := ahv_plant ahv_control ahv_msgs_py ahv_analysis launch docs examples studies test setup.py
 TEXTS := $(wildcard *.md *.rst *.cff docs/*.md) config Makefile package.xml
 
-.PHONY: fly docs test test-docs test-slow bench venv clean
+.PHONY: fly docs test tests style-and-coverage test-docs test-slow bench venv clean
 
 fly: venv
 	@$(BIN)/ahv fly nominal_di --out $(OUT)
 	@$(BIN)/ahv figures $(OUT)/bag --out $(OUT)/figures
 
 test: venv
+	@$(MAKE) --jobs=2 tests style-and-coverage
+
+tests:
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+# Beside the tests, and after them in the queue for the processor; its output is kept for the end.
+style-and-coverage:
 	$(BIN)/ruff check $(MODULES)
 	$(BIN)/ruff format --check $(MODULES)
 	$(BIN)/mypy
 	$(BIN)/codespell $(MODULES) $(TEXTS)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
-	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m "unit and not compiled"
+	@mkdir -p build
+	NUMBA_DISABLE_JIT=1 nice -n 19 $(BIN)/coverage run -m pytest -m "unit and not compiled" \
+	> build/coverage.txt 2>&1 || { cat build/coverage.txt; exit 1; }
 	$(BIN)/coverage report
 
 test-docs: venv

@@ -40,13 +40,14 @@ from ahv_analysis.campaign.store import (
 )
 from ahv_analysis.campaign.summary import exact_interval, summarize_campaign
 from ahv_analysis.campaign.table import CONTROLLERS, REPORT, Row, fly_table, markdown
+from ahv_analysis.command import campaign as campaign_command
 from ahv_analysis.errors import CampaignError, CampaignStopped
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.outcome import Cause
 from ahv_analysis.report.page_figures import campaign_figures
 from ahv_msgs_py.config import config_folder
 from ahv_plant.numerics.identity import HOUSE
-from test.test_command import ahv
+from test.test_command import ahv, told
 
 RUNS = 150
 AHV = Path(sys.executable).parent / "ahv"
@@ -549,7 +550,7 @@ def test_the_command_flies_reruns_and_draws(tmp_path):
     keys = "controller level runs successes success_rate interval failures"
     assert set(keys.split()) | {"trial_steps_per_second", "wall_s"} <= set(summary)
     assert (summary["controller"], summary["level"]) == ("neuro_adaptive_di", 0.4)
-    again = ahv("monte-carlo", "rerun", out, 6, "--json")
+    again = told("monte-carlo", "rerun", out, 6, "--json")
     assert json.loads(again.stdout)["same_bits"] is True, again.stdout
     assert again.returncode == 0
     (part,) = part_files(level_folder(out, 0.4))
@@ -557,11 +558,11 @@ def test_the_command_flies_reruns_and_draws(tmp_path):
     columns = {name: column.copy() for name, column in columns.items()}
     columns["final_altitude_m"][5] += 1e-9
     write_part(part, [columns], described)
-    again = ahv("monte-carlo", "rerun", out, 5, "--json")
+    again = told("monte-carlo", "rerun", out, 5, "--json")
     assert again.returncode == 1
     assert json.loads(again.stdout)["differing"] == ["final_altitude_m"]
     assert again.stderr.strip() == "ahv: run 5 differs from the campaign's in final_altitude_m"
-    figures = ahv("figures", out, "--runs", 6, "--out", tmp_path / "figures", "--json")
+    figures = told("figures", out, "--runs", 6, "--out", tmp_path / "figures", "--json")
     assert figures.returncode == 0, figures.stderr
     names = {Path(name).name for name in json.loads(figures.stdout)["figures"]}
     assert names == {f"figure_4_{n}.{kind}" for n in range(6, 11) for kind in ("png", "svg")}
@@ -569,7 +570,8 @@ def test_the_command_flies_reruns_and_draws(tmp_path):
 
 def test_a_run_can_be_flown_on_the_graph(tmp_path):
     out = tmp_path / "campaign"
-    fly = ("monte-carlo", "--controller", "nominal_di", "--random-starts", "--level", 0.0)
+    case = short_case(tmp_path, "nominal_di", "20.0")
+    fly = ("monte-carlo", "--controller", case, "--random-starts", "--level", 0.0)
     assert ahv(*fly, "--runs", 3, "--out", out, "--json").returncode == 0
     result = ahv("monte-carlo", "rerun", out, 2, "--graph", "--out", tmp_path / "run", "--json")
     assert result.returncode == 0, result.stderr
@@ -578,7 +580,7 @@ def test_a_run_can_be_flown_on_the_graph(tmp_path):
     from ahv_analysis.bag.reader import read_bag
 
     flight = read_bag(Path(found["bag"]))
-    assert flight.steps == 15000
+    assert flight.steps == 2000
     assert np.max(np.abs(np.degrees(flight.air.alpha))) == pytest.approx(
         found["max_abs_alpha_deg"], rel=1e-12
     )
@@ -611,11 +613,18 @@ def test_ctrl_c_keeps_what_was_flown(tmp_path):
         (("table", "--runs", "many"), ("--runs", "many")),
         (("figures", ".", "--out", "x"), ("not a bag",)),
         (("monte-carlo", "--runs", 1, "--out", sys.executable), ("cannot hold a campaign",)),
-        (("monte-carlo", "--runs", 1, "--dask", "tcp://127.0.0.1:9"), ("no dask scheduler",)),
     ],
 )
 def test_wrong_input_is_named(arguments, words, tmp_path):
-    result = ahv(*arguments, cwd=tmp_path)
+    result = told(*arguments, cwd=tmp_path)
     assert result.returncode == 2, result.stderr
     assert result.stdout == "" and "Traceback" not in result.stderr
     assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_a_scheduler_that_is_not_there_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(campaign_command, "LONGEST_SEARCH", "0.5s")
+    command = ("monte-carlo", "--runs", 1, "--dask", "tcp://127.0.0.1:9")
+    result = told(*command, cwd=tmp_path)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "no dask scheduler" in result.stderr and "Traceback" not in result.stderr

@@ -5,11 +5,14 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
 from PIL import Image
+from typer.testing import CliRunner
 
+from ahv_analysis.command.app import app
 from ahv_analysis.flight.case import case_names
 from ahv_plant.model.vectors import State
 
@@ -26,8 +29,17 @@ def ahv(*arguments, domain=100, cwd=None, **environment):
     )
 
 
+def told(*arguments, cwd="."):
+    """Run the command in this process, which has all that it imports: for what it says."""
+    with chdir(cwd):
+        end = CliRunner().invoke(
+            app, [*map(str, arguments)], prog_name="ahv", catch_exceptions=False
+        )
+    return subprocess.CompletedProcess(arguments, end.exit_code, end.stdout, end.stderr)
+
+
 def test_trim_as_json():
-    result = ahv("trim", "--json")
+    result = told("trim", "--json")
     found = json.loads(result.stdout)
     assert result.returncode == 0
     assert found["w_mps"] == pytest.approx(91.878, abs=5e-4)
@@ -42,18 +54,18 @@ def test_trim_as_json():
 
 
 def test_trim_as_a_table():
-    result = ahv("trim")
+    result = told("trim")
     assert result.returncode == 0
     assert "91.878" in result.stdout and "theta_deg" in result.stdout
 
 
 def test_a_trim_is_rounded_to_what_is_meant():
-    found = json.loads(ahv("trim", "--json").stdout)
+    found = json.loads(told("trim", "--json").stdout)
     assert (found["v_mps"], found["rudder_deg"]) == (0.0, 0.0)
 
 
 def test_a_trim_out_of_limits_is_told_by_words_and_exit_code():
-    result = ahv("trim", "--altitude", 9000, "--speed", 2500)
+    result = told("trim", "--altitude", 9000, "--speed", 2500)
     assert result.returncode == 1
     assert result.stderr == "ahv: the trim is out of reach: throttle 1.5643 (0.1 to 0.9)\n"
 
@@ -64,18 +76,18 @@ def test_what_a_newcomer_types_first():
     assert version.stdout.startswith("ahv 0.")
     bare = ahv()
     assert (bare.returncode, bare.stderr) == (0, "")
-    assert bare.stdout == ahv("-h").stdout == ahv("--help").stdout
+    assert bare.stdout == told("-h").stdout == told("--help").stdout
     assert "..." not in bare.stdout.replace("[ARGS]...", "")  # no text is cut
     names = [line.split()[0] for line in bare.stdout.partition("Commands:\n")[2].splitlines()]
     in_order = "fly figures report bag replay monte-carlo table faults trim"
     assert " ".join(names) == in_order
-    flying = ahv("fly", "--help").stdout
+    flying = told("fly", "--help").stdout
     assert all(name in flying.replace(",", " ").split() for name in case_names())
 
 
 @pytest.mark.parametrize("group", ["bag", "monte-carlo", "faults"])
 def test_help_texts_are_whole(group):
-    commands = ahv(group, "--help").stdout.partition("Commands:\n")[2]
+    commands = told(group, "--help").stdout.partition("Commands:\n")[2]
     assert commands and "..." not in commands
 
 
@@ -89,7 +101,7 @@ def test_help_texts_are_whole(group):
     ],
 )
 def test_with_json_errors_are_json(arguments, words, tmp_path):
-    result = ahv(*arguments, "--json", cwd=tmp_path)
+    result = told(*arguments, "--json", cwd=tmp_path)
     assert (result.returncode, result.stderr) == (2, "")
     assert words in json.loads(result.stdout)["error"]
 
@@ -119,28 +131,49 @@ def test_a_terminal_without_width_shows_all():
 ODD = "x[/red] [bold]Grün :smile: \udcff"  # markup, an emoji code, and a byte that is no text
 
 
+IN_TURN = """
+import json, sys
+from ahv_analysis.command.main import prepare
+prepare()
+from ahv_analysis.command.app import app
+for arguments in json.loads(sys.argv[1]):
+    try:
+        app(arguments)
+    except SystemExit as end:
+        if end.code:
+            raise
+    print(end="\\0")
+"""
+
+
 def test_a_name_is_never_markup_and_no_output_fails_for_its_characters(tmp_path):
     """All commands about a flight, in a folder and on a terminal as odd as can be."""
-    odd = {"PYTHONIOENCODING": "ascii", "MPLBACKEND": "nonsense", "domain": "101"}
-    out = tmp_path / ODD
-    shown = "x[/red] [bold]Gr\\xfcn :smile: \\udcff"
-
-    def told(*arguments):
-        result = ahv(*arguments, cwd=tmp_path, **odd)
-        assert result.returncode == 0, result.stderr
-        assert "Traceback" not in result.stderr
-        return "".join(result.stdout.replace("|", "").split())
-
-    flight = ("fly", "neuro_adaptive_di", "--engine", "library", "--duration", 0.2)
-    bag = Path(ODD) / "bag"
-    said = "".join(shown.split())
-    assert said in told(*flight, "--out", ODD)
-    assert said in told("bag", "info", bag)
-    assert said in told("bag", "recover", bag)
-    assert said in told("bag", "export", bag, "--csv", out / "flight.csv")
-    assert said in told("figures", bag, "--out", out / "figures")
-    assert said in told("report", bag, "--out", out / "pages")
-    assert said in told("replay", bag, "--out", out / "replayed")
+    odd = {"PYTHONIOENCODING": "ascii", "MPLBACKEND": "nonsense"}
+    out, bag = tmp_path / ODD, f"{ODD}/bag"
+    commands = (
+        ("fly", "neuro_adaptive_di", "--engine", "library", "--duration", "0.2", "--out", ODD),
+        ("bag", "info", bag),
+        ("bag", "recover", bag),
+        ("bag", "export", bag, "--csv", f"{out}/flight.csv"),
+        ("figures", bag, "--out", f"{out}/figures"),
+        ("report", bag, "--out", f"{out}/pages"),
+        ("replay", bag, "--out", f"{out}/replayed"),
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", IN_TURN, json.dumps(commands)],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env=os.environ | odd,
+        timeout=120,
+    )
+    assert result.returncode == 0, result.stderr
+    assert "Traceback" not in result.stderr
+    *said, rest = result.stdout.split("\0")
+    assert (len(said), rest) == (len(commands), "")
+    shown = "x[/red][bold]Gr\\xfcn:smile:\\udcff"
+    for command, words in zip(commands, said, strict=True):
+        assert shown in "".join(words.replace("|", "").split()), command
 
 
 def test_a_campaign_in_an_odd_folder(tmp_path):
@@ -155,7 +188,7 @@ def test_a_campaign_in_an_odd_folder(tmp_path):
 def test_figures_are_never_overwritten(flown, tmp_path):
     _, out, _ = flown
     (tmp_path / "figure_3_2.svg").write_text("mine")
-    result = ahv("figures", out / "bag", "--out", tmp_path)
+    result = told("figures", out / "bag", "--out", tmp_path)
     assert result.returncode == 2
     assert "figure_3_2.svg exists already: choose another --out" in result.stderr
     assert [file.read_text() for file in tmp_path.iterdir()] == ["mine"]
@@ -226,17 +259,22 @@ def test_figures_of_a_bag(flown, tmp_path):
         (("fly", "nominal_di", "--engine", "warp"), ("--engine", "warp", "graph")),
         (("figures", "nothing", "--out", "x"), ("nothing is not a bag",)),
         (("trim", "--altitude", "high"), ("--altitude", "high")),
-        (("fly", "nominal_di", "--out", sys.executable), (sys.executable,)),
         (("fly", "n" * 300), ("name too long",)),
     ],
 )
 def test_wrong_input_is_named(arguments, words, tmp_path):
-    result = ahv(*arguments, cwd=tmp_path)
+    result = told(*arguments, cwd=tmp_path)
     assert result.returncode == 2
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
     assert all(word in result.stderr for word in words), result.stderr
     assert list(tmp_path.iterdir()) == []  # nothing was begun
+
+
+def test_a_file_where_a_folder_is_to_be_is_named():
+    result = ahv("fly", "nominal_di", "--out", sys.executable)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert sys.executable in result.stderr and "Traceback" not in result.stderr
 
 
 def test_a_flight_is_never_overwritten(flown):

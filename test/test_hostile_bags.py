@@ -286,7 +286,7 @@ def test_what_unpacks_without_end_and_what_never_ends_take_no_memory(tmp_path, s
     files = {
         "zstd": header + chunk(b"zstd", bomb, 100),
         "claimed": header + chunk(b"zstd", bomb, 2**31),
-        "many": header + chunk(b"zstd", zeros(b"zstd", 15), 15 * 2**20) * 2000,
+        "many": header + chunk(b"zstd", zeros(b"zstd", 15), 15 * 2**20) * 100,
         "lz4": header + chunk(b"lz4", zeros(b"lz4", 256), 100),
         "whole": bomb,  # as if rosbag2 had compressed the file
     }

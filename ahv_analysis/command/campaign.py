@@ -29,6 +29,8 @@ from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
 
+LONGEST_SEARCH = "10s"  # for a dask scheduler
+
 monte_carlo = typer.Typer(
     help="Fly many drawn vehicles, and any of them again alone.",
     add_completion=False,
@@ -52,7 +54,7 @@ def executor_of(workers: int, dask: str | None) -> Iterator[Executor]:
         raise UsageError("--dask needs the extra ahv[dask]") from error
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what fails is said here
     try:
-        client = Client(dask, timeout="10s")
+        client = Client(dask, timeout=LONGEST_SEARCH)
     except (OSError, ValueError) as error:
         raise UsageError(f"no dask scheduler answers at {dask}: {error}") from error
     with client, client.get_executor(pure=False, retries=10) as pool:

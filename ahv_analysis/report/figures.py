@@ -2,6 +2,7 @@
 """The report's figures, drawn from recorded flights."""
 
 from collections.abc import Callable, Mapping, Sequence
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,6 +11,8 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from ahv_analysis.bag.record import FlightRecord
@@ -97,6 +100,7 @@ CAMPAIGN_3, CAMPAIGN_4, CAMPAIGN_5 = (
 )
 
 TUMBLING = 20.0 / DEGREES  # [rad] angle of attack at which a vehicle is lost
+RESOLUTION = 150  # [1/inch] of PNG files
 STYLE = {
     "font.size": 9,
     "axes.grid": True,
@@ -104,7 +108,6 @@ STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "lines.linewidth": 1.4,
-    "svg.hashsalt": "ahv",  # the same flight gives the same file
 }
 
 
@@ -227,6 +230,16 @@ def figure_files(plate: Plate, folder: Path) -> list[Path]:
     return [folder / f"{name}.{kind}" for kind in ("png", "svg")]
 
 
+def write_figure(figure: Figure, file: Path | StringIO, kind: str) -> None:
+    """Write a figure as "png" or "svg", as it is: `savefig` would lay it out and draw it twice."""
+    if kind == "png":
+        figure.set_dpi(RESOLUTION)
+        FigureCanvasAgg(figure).print_png(file)
+    else:
+        with pyplot.rc_context({"svg.hashsalt": "ahv"}):  # the same flight gives the same file
+            FigureCanvasSVG(figure).print_svg(file, metadata={"Date": None})
+
+
 def save_figures(
     plates: Sequence[Plate],
     draw_plate: Callable[[Plate], Figure],
@@ -239,9 +252,8 @@ def save_figures(
     for done, plate in enumerate(plates, 1):
         figure = draw_plate(plate)
         for path in figure_files(plate, folder):
-            metadata = {"Date": None} if path.suffix == ".svg" else None
             with signals_wait():
-                figure.savefig(path, dpi=150, metadata=metadata)
+                write_figure(figure, path, path.suffix[1:])
             written.append(path)
         pyplot.close(figure)
         progress(done)

@@ -17,6 +17,7 @@ from ahv_analysis.bag.info import refused_words
 from ahv_analysis.bag.rows import Array
 from ahv_analysis.quantities import AXES, CONTROLS, TRACKED, Quantity, of_group
 from ahv_analysis.report.drawn import EXACT, drawn, drawn_time, thinned_to
+from ahv_analysis.report.figures import write_figure
 from ahv_analysis.report.page_figures import flight_figures
 from ahv_analysis.report.page_flight import Flight
 from ahv_msgs_py.graph import NODES, case_nodes
@@ -139,7 +140,7 @@ def draw_figures(flight: Flight) -> list[str]:
     drawings = []
     for plate in plates:
         figure, drawing = draw(plate), StringIO()
-        figure.savefig(drawing, format="svg", metadata={"Date": None})
+        write_figure(figure, drawing, "svg")
         pyplot.close(figure)
         drawings.append(drawing.getvalue())
     return drawings
