@@ -22,7 +22,7 @@ fly: venv
 	@$(BIN)/ahv figures $(OUT)/bag --out $(OUT)/figures
 
 test: venv
-	@$(MAKE) --jobs=2 tests style-and-coverage
+	@$(MAKE) --no-print-directory --jobs=2 tests style-and-coverage
 
 tests:
 	$(BIN)/python -m pytest -n 2 --dist loadfile
