@@ -65,6 +65,13 @@ class Measurement(NamedTuple):
     surfaces: Surfaces
 
 
+class Controls(NamedTuple):
+    """What moves the vehicle, or the commands for it."""
+
+    surfaces: Surfaces
+    throttle: float  # [-] sigma_T
+
+
 @elementwise
 def clamp(value: float, lower: float, upper: float) -> float:
     """Limit `value` to what lies between `lower` and `upper`, in any unit."""

@@ -1,0 +1,125 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Actuators: what lies between a commanded position and the one that acts.
+
+A servo of first or second order with limits on rate and position, a dead zone in front of it and
+backlash behind it; and what can become of it in flight. The rates of its states go into the
+vehicle's Runge-Kutta step. Units are those of what is moved: rad for a surface, the throttle's own
+for the engine.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from ahv_plant.model.vectors import clamp
+from ahv_plant.numerics.elementwise import elementwise, select
+
+
+class Failure(IntEnum):
+    """What has become of an actuator; a number, so that all runs of a batch share the code."""
+
+    NONE = 0
+    STUCK = 1  # where it is
+    FLOATING = 2  # what it moved bears no load: a surface turns with the wind
+    HARD_UP = 3  # it runs to its lower stop: trailing edge up, throttle closed
+    HARD_DOWN = 4  # it runs to its upper stop: trailing edge down, throttle open
+    HALF_EFFECTIVE = 5  # half of what it moved is gone
+
+
+class Actuator(NamedTuple):
+    """One actuator."""
+
+    order: int  # 0 moves at once; 1 or 2 is the order of the servo
+    frequency: float  # [rad/s] natural frequency; of first order the bandwidth
+    damping: float  # [-] of second order
+    rate_limit: float  # [1/s] times the unit of position; infinity is off
+    lower: float  # stop
+    upper: float  # stop
+    dead_zone: float  # error to either side that the servo does not notice
+    backlash: float  # play between servo and what it moves, end to end
+    failure: int = Failure.NONE
+    failure_time: float = 0.0  # [s] from when on
+
+
+class Servo(NamedTuple):
+    """State of an actuator; also its rates, by second."""
+
+    position: float  # of the servo
+    rate: float  # of second order
+    output: float  # position of what it moves: its own but for the play
+
+
+@elementwise
+def resting(position: float, actuator: Actuator) -> Servo:
+    """Servo at rest, with what it moves at `position`."""
+    held = clamp(position, actuator.lower, actuator.upper)
+    return Servo(held, 0.0 * held, held)
+
+
+@elementwise
+def ordered(servo: Servo, command: float, time: float, actuator: Actuator) -> float:
+    """Position that the servo is told at `time` [s], as far as it has not failed."""
+    failure = select(time >= actuator.failure_time, actuator.failure, 0)
+    told = clamp(command, actuator.lower, actuator.upper)
+    told = select(failure == 1, servo.output, told)
+    told = select(failure == 3, told - told + actuator.lower, told)
+    return select(failure == 4, told - told + actuator.upper, told)
+
+
+@elementwise
+def servo_rate(servo: Servo, told: float, time: float, actuator: Actuator) -> Servo:
+    """Rates of the servo's states on its way to what it was `told`.
+
+    First order: x' = w e; second order: x'' = w (w e - 2 zeta x'), with the error e behind the
+    dead zone and x' within the rate limit, beyond which it does not wind up.
+    """
+    error = told - servo.position
+    noticed = error - clamp(error, -actuator.dead_zone, actuator.dead_zone)
+    wanted = actuator.frequency * noticed
+    limit = actuator.rate_limit
+    rate = clamp(servo.rate, -limit, limit)
+    push = actuator.frequency * (wanted - 2.0 * actuator.damping * rate)
+    none = 0.0 * push
+    outward = ((rate >= limit) & (push > 0.0)) | ((rate <= -limit) & (push < 0.0))
+    stuck = (time >= actuator.failure_time) & (actuator.failure == 1)
+    moving = select(actuator.order == 2, rate, clamp(wanted, -limit, limit))
+    gaining = select(actuator.order == 2, select(outward, none, push), none)
+    return Servo(select(stuck, none, moving), select(stuck, none, gaining), none)
+
+
+@elementwise
+def moved(servo: Servo, told: float, actuator: Actuator) -> float:
+    """Position of what the servo moves: within the play it stays where it was."""
+    play = 0.5 * actuator.backlash
+    dragged = clamp(servo.output, servo.position - play, servo.position + play)
+    return select(actuator.order == 0, told, dragged)
+
+
+@elementwise
+def in_the_wind(position: float, wind: float, time: float, actuator: Actuator) -> float:
+    """Where a surface is: where it was moved to, or, afloat, where the `wind` turns it."""
+    afloat = (time >= actuator.failure_time) & (actuator.failure == 2)
+    return select(afloat, clamp(wind, actuator.lower, actuator.upper), position)
+
+
+@elementwise
+def effect(position: float, time: float, actuator: Actuator) -> float:
+    """Position of a whole surface that would have the effect of this one."""
+    half = (time >= actuator.failure_time) & (actuator.failure == 5)
+    return select(half, 0.5 * position, position)
+
+
+@elementwise
+def along_servo(servo: Servo, rate: Servo, time: float) -> Servo:
+    """The servo moved along its rates for `time` [s]; the output is that of the step's start."""
+    return Servo(
+        servo.position + time * rate.position, servo.rate + time * rate.rate, servo.output
+    )
+
+
+@elementwise
+def settled(servo: Servo, told: float, actuator: Actuator) -> Servo:
+    """Servo at the end of a step: at a stop it stands still, and drags along what it moves."""
+    reached = clamp(servo.position, actuator.lower, actuator.upper)
+    reached = select(actuator.order == 0, told, reached)
+    rate = select(reached == servo.position, servo.rate, 0.0 * reached)
+    return Servo(reached, rate, moved(Servo(reached, rate, servo.output), told, actuator))

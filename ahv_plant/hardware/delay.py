@@ -1,0 +1,44 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""Latency: whole steps from a measured state to the arrival of its commands at the actuators.
+
+The commands under way are rows of an array, which the flight's loop keeps, one row a step in
+turn; for a batch every number of a row is lanes.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahv_plant.model.vectors import Controls, Surfaces
+from ahv_plant.numerics.elementwise import elementwise, select
+from ahv_plant.numerics.simd import load, store
+
+LONGEST = 20  # [steps] of delay
+ROWS = LONGEST + 2  # the newest, the longest delay, and a step of jitter
+_LIKE = Controls(Surfaces(0.0, 0.0, 0.0), 0.0)
+
+
+def line_at(start: Controls, lanes: int | None = None) -> NDArray[np.float64]:
+    """Line (ROWS, 4[, lanes]) before the first command: what arrives from it is `start`."""
+    row = np.array([*start.surfaces, start.throttle])
+    return np.array([row if lanes is None else np.repeat(row[:, None], lanes, 1)] * ROWS)
+
+
+@elementwise
+def through(line, controls, step, delay, late):  # type: ignore[no-untyped-def]
+    """Send the `controls` of a step and return those that arrive at it.
+
+    `delay` [steps]; where `late` is 1 what should arrive comes a step later, and what came before
+    stays in force; 0 else.
+    """
+    store(line[step % ROWS], controls)
+    due = load(_LIKE, line[(step - delay + ROWS) % ROWS])
+    last = load(_LIKE, line[(step - delay - 1 + ROWS) % ROWS])
+    waits = late == 1.0
+    return Controls(
+        Surfaces(
+            select(waits, last.surfaces.right_elevon, due.surfaces.right_elevon),
+            select(waits, last.surfaces.left_elevon, due.surfaces.left_elevon),
+            select(waits, last.surfaces.rudder, due.surfaces.rudder),
+        ),
+        select(waits, last.throttle, due.throttle),
+    )

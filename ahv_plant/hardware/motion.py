@@ -1,0 +1,154 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""A vehicle on its actuators: one Runge-Kutta step of both together."""
+
+from typing import NamedTuple
+
+from ahv_plant.dispersion import Truth
+from ahv_plant.hardware.actuators import (
+    Actuator,
+    Servo,
+    along_servo,
+    effect,
+    in_the_wind,
+    moved,
+    ordered,
+    resting,
+    servo_rate,
+    settled,
+)
+from ahv_plant.model.constants import STEP
+from ahv_plant.model.vectors import Controls, State, Surfaces
+from ahv_plant.numerics.elementary import atan2
+from ahv_plant.numerics.elementwise import elementwise
+from ahv_plant.vehicle import along, state_rate
+
+
+class Actuators(NamedTuple):
+    """One of each control."""
+
+    right_elevon: Actuator
+    left_elevon: Actuator
+    rudder: Actuator
+    throttle: Actuator  # the engine
+
+
+class Servos(NamedTuple):
+    """States of the actuators, or their rates."""
+
+    right_elevon: Servo
+    left_elevon: Servo
+    rudder: Servo
+    throttle: Servo
+
+
+@elementwise
+def resting_servos(start: Controls, by: Actuators) -> Servos:
+    """Servos at rest with the controls at `start`."""
+    return Servos(
+        resting(start.surfaces.right_elevon, by.right_elevon),
+        resting(start.surfaces.left_elevon, by.left_elevon),
+        resting(start.surfaces.rudder, by.rudder),
+        resting(start.throttle, by.throttle),
+    )
+
+
+@elementwise
+def told_servos(servos: Servos, command: Controls, time: float, by: Actuators) -> Controls:
+    """Where the servos are told to go."""
+    return Controls(
+        Surfaces(
+            ordered(servos.right_elevon, command.surfaces.right_elevon, time, by.right_elevon),
+            ordered(servos.left_elevon, command.surfaces.left_elevon, time, by.left_elevon),
+            ordered(servos.rudder, command.surfaces.rudder, time, by.rudder),
+        ),
+        ordered(servos.throttle, command.throttle, time, by.throttle),
+    )
+
+
+@elementwise
+def servo_rates(servos: Servos, told: Controls, time: float, by: Actuators) -> Servos:
+    """Rates of all servos."""
+    surfaces = told.surfaces
+    return Servos(
+        servo_rate(servos.right_elevon, surfaces.right_elevon, time, by.right_elevon),
+        servo_rate(servos.left_elevon, surfaces.left_elevon, time, by.left_elevon),
+        servo_rate(servos.rudder, surfaces.rudder, time, by.rudder),
+        servo_rate(servos.throttle, told.throttle, time, by.throttle),
+    )
+
+
+@elementwise
+def along_servos(servos: Servos, rates: Servos, time: float) -> Servos:
+    """All servos moved along their rates for `time` [s]."""
+    return Servos(
+        along_servo(servos.right_elevon, rates.right_elevon, time),
+        along_servo(servos.left_elevon, rates.left_elevon, time),
+        along_servo(servos.rudder, rates.rudder, time),
+        along_servo(servos.throttle, rates.throttle, time),
+    )
+
+
+@elementwise
+def positions(
+    state: State, servos: Servos, told: Controls, time: float, by: Actuators
+) -> Controls:
+    """Where the controls are. A surface afloat lies in the wind: elevons at -alpha, rudder beta."""
+    alpha = atan2(state.w, state.u)
+    beta = atan2(state.v, abs(state.u))
+    surfaces = told.surfaces
+    right = moved(servos.right_elevon, surfaces.right_elevon, by.right_elevon)
+    left = moved(servos.left_elevon, surfaces.left_elevon, by.left_elevon)
+    rudder = moved(servos.rudder, surfaces.rudder, by.rudder)
+    engine = moved(servos.throttle, told.throttle, by.throttle)
+    return Controls(
+        Surfaces(
+            in_the_wind(right, -alpha, time, by.right_elevon),
+            in_the_wind(left, -alpha, time, by.left_elevon),
+            in_the_wind(rudder, beta, time, by.rudder),
+        ),
+        in_the_wind(engine, 0.0 * engine, time, by.throttle),
+    )
+
+
+@elementwise
+def rate_on_actuators(
+    state: State, servos: Servos, told: Controls, time: float, truth: Truth, by: Actuators
+) -> State:
+    """Rates of the vehicle's states with the controls where the servos have them."""
+    at = positions(state, servos, told, time, by)
+    acting = Surfaces(
+        effect(at.surfaces.right_elevon, time, by.right_elevon),
+        effect(at.surfaces.left_elevon, time, by.left_elevon),
+        effect(at.surfaces.rudder, time, by.rudder),
+    )
+    return state_rate(state, acting, effect(at.throttle, time, by.throttle), time, truth)
+
+
+@elementwise
+def step_on_actuators(
+    state: State, servos: Servos, command: Controls, time: float, truth: Truth, by: Actuators
+) -> tuple[State, Servos]:
+    """Vehicle and servos 0.01 s after `time` [s]: Runge-Kutta of fourth order, commands held."""
+    half, middle, end = 0.5 * STEP, time + 0.5 * STEP, time + STEP
+    told = told_servos(servos, command, time, by)
+    k1 = rate_on_actuators(state, servos, told, time, truth, by)
+    r1 = servo_rates(servos, told, time, by)
+    at = along_servos(servos, r1, half)
+    k2 = rate_on_actuators(along(state, k1, half), at, told, middle, truth, by)
+    r2 = servo_rates(at, told, middle, by)
+    at = along_servos(servos, r2, half)
+    k3 = rate_on_actuators(along(state, k2, half), at, told, middle, truth, by)
+    r3 = servo_rates(at, told, middle, by)
+    at = along_servos(servos, r3, STEP)
+    k4 = rate_on_actuators(along(state, k3, STEP), at, told, end, truth, by)
+    r4 = servo_rates(at, told, end, by)
+    ends = along(along(state, k1, STEP / 6.0), k4, STEP / 6.0)
+    later = along(along(ends, k2, STEP / 3.0), k3, STEP / 3.0)
+    ends_ = along_servos(along_servos(servos, r1, STEP / 6.0), r4, STEP / 6.0)
+    now = along_servos(along_servos(ends_, r2, STEP / 3.0), r3, STEP / 3.0)
+    return later, Servos(
+        settled(now.right_elevon, told.surfaces.right_elevon, by.right_elevon),
+        settled(now.left_elevon, told.surfaces.left_elevon, by.left_elevon),
+        settled(now.rudder, told.surfaces.rudder, by.rudder),
+        settled(now.throttle, told.throttle, by.throttle),
+    )
