@@ -28,6 +28,7 @@ class LearnerSettings(NamedTuple):
     theta: float  # [s^2] weight of the Jacobian's error, Theta = theta I, eq 4.11
     geometric: bool  # h is a geometric altitude
     first_estimate: float = 0.0  # [deg/s^2] d-hat of the pitch channel before any measurement
+    measured_surfaces: bool = False  # the observer hears where they are, not the command
 
 
 class Basis(NamedTuple):

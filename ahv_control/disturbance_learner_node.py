@@ -21,7 +21,7 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
 )
 from ahv_plant.model.constants import DEGREES, STEP_NS
-from ahv_plant.model.vectors import Rates, State, Surfaces
+from ahv_plant.model.vectors import Measurement, Rates, State, Surfaces
 
 
 class DisturbanceLearnerNode(BaseNode):
@@ -87,7 +87,7 @@ class DisturbanceLearnerNode(BaseNode):
                 State(*before),
                 Surfaces(*surfaces),
                 Rates(*command),
-                state,
+                Measurement(state, Surfaces(*surfaces)),
                 self._law,
             )
             error = max(

@@ -16,8 +16,8 @@ from ahv_control.law import Commands
 from ahv_control.newton_raphson import nominal_response, solve_surfaces
 from ahv_control.outer_loop import OuterLoop, attitude_command
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
-from ahv_plant.model.vectors import Rates, State, Surfaces
-from ahv_plant.numerics.elementwise import elementwise
+from ahv_plant.model.vectors import Measurement, Rates, State, Surfaces
+from ahv_plant.numerics.elementwise import elementwise, select
 from ahv_plant.numerics.optional import optional
 
 # The search for the first command starts here; later ones start at the command before.
@@ -35,25 +35,25 @@ class FlightControl(NamedTuple):
 
 
 @elementwise
-def start(state: State, settings: FlightControl) -> tuple[LearnerState | None, Commands]:
-    """Learner, if there is one, and commands at the first state of a flight."""
-    learner = first_learner(state, settings.learner)
-    return learner, answer(state, learner, NEUTRAL, settings)
+def start(measured: Measurement, settings: FlightControl) -> tuple[LearnerState | None, Commands]:
+    """Learner, if there is one, and commands at the first measurement of a flight."""
+    learner = first_learner(measured.state, settings.learner)
+    return learner, answer(measured.state, learner, NEUTRAL, settings)
 
 
 @elementwise
 def step(
     learner: LearnerState | None,
-    before: State,
+    before: Measurement,
     commands: Commands,
-    state: State,
+    measured: Measurement,
     settings: FlightControl,
 ) -> tuple[LearnerState | None, Commands]:
-    """Learner and commands at `state`; `commands` answered the state `before`."""
+    """Learner and commands at a measurement; `commands` answered the one `before`."""
     learner = next_learner(
-        learner, before, commands.surfaces, commands.rates, state, settings.learner
+        learner, before.state, commands.surfaces, commands.rates, measured, settings.learner
     )
-    return learner, answer(state, learner, commands.surfaces, settings)
+    return learner, answer(measured.state, learner, commands.surfaces, settings)
 
 
 @elementwise
@@ -89,17 +89,24 @@ def next_learner(
     before: State,
     surfaces: Surfaces,
     command: Rates,
-    now: State,
+    now: Measurement,
     settings: LearnerSettings,
 ) -> LearnerState:
-    """Learner at the state `now`, from the state `before` and what was commanded then.
+    """Learner now, from the state `before` and the surfaces and rates that were commanded then.
 
+    Where surfaces are measured, those are what the observer of eq 4.3 is told, instead of the
+    commanded ones: else it would take every lag of an actuator for a disturbance of the vehicle.
     None without `settings`.
     """
+    acting = Surfaces(
+        select(settings.measured_surfaces, now.surfaces.right_elevon, surfaces.right_elevon),
+        select(settings.measured_surfaces, now.surfaces.left_elevon, surfaces.left_elevon),
+        select(settings.measured_surfaces, now.surfaces.rudder, surfaces.rudder),
+    )
     return learner_step(
         learner,
-        nominal_response(before, surfaces, settings.geometric),
+        nominal_response(before, acting, settings.geometric),
         command,
-        Rates(now.P, now.Q, now.R),
+        Rates(now.state.P, now.state.Q, now.state.R),
         settings,
     )

@@ -3,13 +3,13 @@
 
 A law is a value, its settings, with two element-wise functions:
 
-    start(state, settings) -> memory, commands
-    step(memory, before, commands, state, settings) -> memory, commands
+    start(measured, settings) -> memory, commands
+    step(memory, before, commands, measured, settings) -> memory, commands
 
-The first is for the first state of a flight, the second for every state after it: `before` is the
-state one step ago, `commands` what was answered to it. The memory is the law's own: what else it
-keeps from step to step, numbers in named tuples or None. `ahv_control.flight_control` has the laws
-of the report; the closed loop calls them.
+The first is for the first measurement of a flight, the second for every one after it: `before` is
+the measurement one step ago, `commands` what was answered to it. The memory is the law's own: what
+else it keeps from step to step, numbers in named tuples or None. `ahv_control.flight_control` has
+the laws of the report; the closed loop calls them.
 """
 
 from typing import NamedTuple

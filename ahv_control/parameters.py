@@ -85,6 +85,11 @@ LEARNER_PARAMETERS = (
         -100.0,
         100.0,
     ),
+    Parameter(
+        "measured_surfaces",
+        False,
+        "the observer of eq 4.3 hears the surfaces as measured; if false, as commanded",
+    ),
     GEOMETRIC_ALTITUDE,
 )
 VELOCITY_PARAMETERS = (
@@ -138,6 +143,7 @@ def learner_settings(values: ParameterValues) -> LearnerSettings:
         float(values["theta"]),
         bool(values["geometric_altitude"]),
         float(values["first_estimate"]),
+        bool(values["measured_surfaces"]),
     )
 
 

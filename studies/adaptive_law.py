@@ -62,7 +62,7 @@ class Score(NamedTuple):
 @numba.njit(error_model="numpy")
 def explicit_step(loop: Loop, settings: LearnerSettings) -> LearnerState:
     """Learner one step later by explicit Euler, the obvious way and the wrong one."""
-    learner, before, answered = loop.memory, loop.state, loop.commands
+    learner, before, answered = loop.memory, loop.plant.state, loop.commands
     rates = Rates(before.P, before.Q, before.R)
     response = nominal_response(before, answered.surfaces, settings.geometric)
     estimate = disturbance_estimate(learner, rates)
@@ -89,20 +89,20 @@ def fly_study(
     state: State, settings: FlightControl, truth: Truth, explicit: bool, steps: int
 ) -> tuple[int, float, float, float]:
     """Fly until the end or the loss of the vehicle; sums for `Score`."""
-    loop = start_loop(state, settings)
+    loop = start_loop(state, settings, None, None)
     largest, follow, rough = 0.0, 0.0, 0.0
     for number in range(steps):
-        state, before = loop.state, loop.commands.surfaces
+        state, before = loop.plant.state, loop.commands.surfaces
         alpha = abs(atan(state.w / state.u))
         if not alpha <= UNSTART_ALPHA or termination(state, truth.geometric) != 0:
             return number, largest, follow, rough
-        later = loop_step(loop, number, truth, settings)
+        later = loop_step(loop, number, truth, settings, None, None)
         if explicit:
             learner = explicit_step(loop, settings.learner)
-            commands = answer(later.state, learner, before, settings)
-            later = Loop(later.state, learner, commands)
+            commands = answer(later.plant.state, learner, before, settings)
+            later = Loop(later.plant, learner, commands)
         loop = later
-        state, learner, now = loop.state, loop.memory, loop.commands.surfaces
+        state, learner, now = loop.plant.state, loop.memory, loop.commands.surfaces
         a, d = learner.X_a, learner.X_d
         e = max(abs(state.P - a.P), abs(state.Q - a.Q), abs(state.R - a.R))
         largest = max(largest, e)

@@ -17,6 +17,7 @@ from ahv_analysis.campaign.summary import exact_interval
 from ahv_analysis.campaign.table import CONTROLLERS, REPORT
 from ahv_analysis.flight.case import Case, load_case, make_case
 from ahv_analysis.flight.library import fly
+from ahv_control.flight_control import NEUTRAL
 from ahv_control.flight_control import start as start_law
 from ahv_plant.dispersion import Dispersion, Truth
 from ahv_plant.model.constants import (
@@ -26,7 +27,7 @@ from ahv_plant.model.constants import (
     THROTTLE_MAXIMUM,
     UNSTART_ALPHA,
 )
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Measurement, State, Surfaces
 from ahv_plant.numerics.elementary import atan
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.vehicle import vehicle_step
@@ -90,7 +91,7 @@ def nose_comes_down(state: State, truth: Truth, before: Surfaces, delay: int) ->
 def beyond_elevons(campaign: Campaign, delay: int) -> set[int]:
     """Runs on vehicles that their elevons cannot save after a delay [steps] in level trim."""
     start, control = campaign.case.plant.initial, campaign.case.control
-    _, commands = start_law(start, control)
+    _, commands = start_law(Measurement(start, NEUTRAL), control)
     truths = [Truth(dispersion=campaign.dispersion(run)) for run in range(campaign.runs)]
     return {
         run

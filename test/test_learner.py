@@ -27,7 +27,7 @@ from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.flight_control import answer, next_learner
 from ahv_plant.dispersion import NOMINAL, disturbance_acceleration
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
-from ahv_plant.model.vectors import Rates, Surfaces
+from ahv_plant.model.vectors import Measurement, Rates, Surfaces
 from ahv_plant.vehicle import vehicle_step
 from test.flights import CRUISE, as_python, between
 
@@ -259,7 +259,12 @@ def test_a_surface_at_its_stop_does_not_wind_the_learner_up():
     for step in range(40):
         later = vehicle_step(state, stop, 0.2, step * STEP, NOMINAL)
         learner = next_learner(
-            learner, state, stop, Rates(1.0, 1.0, 1.0), later, case.control.learner
+            learner,
+            state,
+            stop,
+            Rates(1.0, 1.0, 1.0),
+            Measurement(later, stop),
+            case.control.learner,
         )
         state = later
     estimate = np.array(disturbance_estimate(learner, Rates(state.P, state.Q, state.R)))

@@ -24,14 +24,14 @@ def largest_alpha(run, fall_back):
     changes = dispersion_parameters(draw_dispersion(0.3, 11, run))
     case = load_case("neuro_adaptive_sc_gdi", changes)
     truth = case.plant.truth
-    loop = start_loop(case.plant.initial, case.control)
+    loop = start_loop(case.plant.initial, case.control, None, None)
     for number in range(CALM):
-        loop = loop_step(loop, number, truth, case.control)
+        loop = loop_step(loop, number, truth, case.control, None, None)
     held, throttle = loop.commands.surfaces, loop.commands.throttle
-    state = loop.state._replace(Q=loop.state.Q + PITCHING * RADIANS * (-1) ** run)
+    state = loop.plant.state._replace(Q=loop.plant.state.Q + PITCHING * RADIANS * (-1) ** run)
     largest = 0.0
     for step in range(OUTAGE):
-        surfaces = held if step <= 20 else fall_back(held, loop.state, state)
+        surfaces = held if step <= 20 else fall_back(held, loop.plant.state, state)
         state = State(*vehicle_step(state, surfaces, throttle, (CALM + step) * STEP, truth))
         largest = max(largest, abs(atan2(state.w, state.u)) * DEGREES)
     return largest

@@ -25,10 +25,10 @@ LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 def run_outcome(state, truth, control, steps):
     """Outcome of a flight; the numbers may be lanes."""
     one, altitude = state.u, control.outer.altitude
-    loop, outcome = widen(start_loop(state, control), one), widen(START, one)
+    loop, outcome = widen(start_loop(state, control, None, None), one), widen(START, one)
     for number in range(steps):
         outcome = next_outcome(outcome, loop, altitude, truth.geometric)
-        loop = widen(loop_step(loop, number, truth, control), one)
+        loop = widen(loop_step(loop, number, truth, control, None, None), one)
     return next_outcome(outcome, loop, altitude, truth.geometric)
 
 
@@ -50,13 +50,13 @@ def trim_batch(dispersions, like, altitude, speed, mass, calm, result):
 @kernel
 def run_trajectory(state, truth, control, steps, every, states, commands):
     """Fly one run; keep every so many states (13) and commands (10)."""
-    loop = start_loop(state, control)
+    loop = start_loop(state, control, None, None)
     for number in range(steps + 1):
         if number % every == 0:
-            _keep(number // every, loop.state, loop.commands, states, commands)
-        if termination(loop.state, truth.geometric) != 0:
+            _keep(number // every, loop.plant.state, loop.commands, states, commands)
+        if termination(loop.plant.state, truth.geometric) != 0:
             return number
-        loop = loop_step(loop, number, truth, control)
+        loop = loop_step(loop, number, truth, control, None, None)
     return steps
 
 

@@ -12,31 +12,39 @@ from ahv_control.disturbance_learner import LearnerState
 from ahv_control.flight_control import FlightControl, start, step
 from ahv_control.law import Commands
 from ahv_plant.dispersion import Truth
-from ahv_plant.model.constants import STEP
-from ahv_plant.model.vectors import State
+from ahv_plant.model.vectors import Controls, State
 from ahv_plant.numerics.elementwise import composition, elementwise
-from ahv_plant.vehicle import vehicle_step
+from ahv_plant.plant import Draws, Plant, Rig, plant_step, start_plant
 
 
 class Loop(NamedTuple):
     """The closed loop at one step."""
 
-    state: State  # true
+    plant: Plant
     memory: LearnerState | None  # of the flight control
-    commands: Commands  # that answer the state
+    commands: Commands  # that answer the measurement
 
 
 @elementwise
-def start_loop(state: State, control: FlightControl) -> Loop:
-    """Loop at the first state of a flight."""
-    memory, commands = start(state, control)
-    return Loop(state, memory, commands)
+def start_loop(state: State, control: FlightControl, draws: Draws | None, rig: Rig | None) -> Loop:
+    """Loop at the first state of a flight; without a rig the hardware is ideal."""
+    plant = start_plant(state, draws, rig)
+    memory, commands = start(plant.measured, control)
+    return Loop(plant, memory, commands)
 
 
 @composition
-def loop_step(loop: Loop, number: int, truth: Truth, control: FlightControl) -> Loop:
+def loop_step(
+    loop: Loop,
+    number: int,
+    truth: Truth,
+    control: FlightControl,
+    draws: Draws | None,
+    rig: Rig | None,
+) -> Loop:
     """Loop one step later; `number` counts the steps flown before."""
     held = loop.commands
-    state = vehicle_step(loop.state, held.surfaces, held.throttle, number * STEP, truth)
-    memory, commands = step(loop.memory, loop.state, held, state, control)
-    return Loop(state, memory, commands)
+    command = Controls(held.surfaces, held.throttle)
+    plant = plant_step(loop.plant, command, number, truth, draws, rig)
+    memory, commands = step(loop.memory, loop.plant.measured, held, plant.measured, control)
+    return Loop(plant, memory, commands)

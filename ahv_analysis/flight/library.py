@@ -38,10 +38,10 @@ INTERRUPTED = "interrupted"  # why a flight ended early, where a signal does not
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the model no longer describes the vehicle."""
     truth, control = case.plant.truth, case.control
-    loop = start_loop(case.plant.initial, control)
+    loop = start_loop(case.plant.initial, control, None, None)
     for number in range(case.plant.steps):
-        later = loop_step(loop, number, truth, control)
-        reason = termination_reason(later.state, truth.geometric, (number + 1) * STEP)
+        later = loop_step(loop, number, truth, control, None, None)
+        reason = termination_reason(later.plant.state, truth.geometric, (number + 1) * STEP)
         yield _step(number, loop, reason)
         if reason:
             return
@@ -50,7 +50,7 @@ def fly(case: Case) -> Iterator[Step]:
 
 
 def _step(number: int, loop: Loop, ended_early: str) -> Step:
-    return Step(number * STEP_NS, loop.state, loop.commands, loop.memory, ended_early)
+    return Step(number * STEP_NS, loop.plant.state, loop.commands, loop.memory, ended_early)
 
 
 def fly_library(

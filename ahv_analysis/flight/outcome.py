@@ -87,7 +87,7 @@ def next_outcome(outcome: Outcome, loop: Loop, altitude: float, geometric: bool)
 
     `altitude` [m] is h*; `geometric` says which altitude h is.
     """
-    state, answer = loop.state, loop.commands
+    state, answer = loop.plant.state, loop.commands
     observed = observer_error(state, loop.memory)
     alpha = abs(atan2(state.w, state.u))
     v = abs(state.v)

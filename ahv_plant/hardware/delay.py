@@ -24,7 +24,9 @@ def line_at(start: Controls, lanes: int | None = None) -> NDArray[np.float64]:
 
 
 @elementwise
-def through(line, controls, step, delay, late):  # type: ignore[no-untyped-def]
+def through(
+    line: NDArray[np.float64], controls: Controls, step: int, delay: int, late: float
+) -> Controls:
     """Send the `controls` of a step and return those that arrive at it.
 
     `delay` [steps]; where `late` is 1 what should arrive comes a step later, and what came before

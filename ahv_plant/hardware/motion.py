@@ -92,7 +92,7 @@ def along_servos(servos: Servos, rates: Servos, time: float) -> Servos:
 def positions(
     state: State, servos: Servos, told: Controls, time: float, by: Actuators
 ) -> Controls:
-    """Where the controls are. A surface afloat lies in the wind: elevons at -alpha, rudder beta."""
+    """Where the controls are; surfaces afloat lie in the wind, elevons at -alpha, rudder beta."""
     alpha = atan2(state.w, state.u)
     beta = atan2(state.v, abs(state.u))
     surfaces = told.surfaces
@@ -127,8 +127,11 @@ def rate_on_actuators(
 @elementwise
 def step_on_actuators(
     state: State, servos: Servos, command: Controls, time: float, truth: Truth, by: Actuators
-) -> tuple[State, Servos]:
-    """Vehicle and servos 0.01 s after `time` [s]: Runge-Kutta of fourth order, commands held."""
+) -> tuple[State, Servos, Controls]:
+    """Vehicle, servos and controls 0.01 s after `time` [s] under a held command.
+
+    Runge-Kutta of fourth order, as for the vehicle alone.
+    """
     half, middle, end = 0.5 * STEP, time + 0.5 * STEP, time + STEP
     told = told_servos(servos, command, time, by)
     k1 = rate_on_actuators(state, servos, told, time, truth, by)
@@ -146,9 +149,10 @@ def step_on_actuators(
     later = along(along(ends, k2, STEP / 3.0), k3, STEP / 3.0)
     ends_ = along_servos(along_servos(servos, r1, STEP / 6.0), r4, STEP / 6.0)
     now = along_servos(along_servos(ends_, r2, STEP / 3.0), r3, STEP / 3.0)
-    return later, Servos(
+    servos = Servos(
         settled(now.right_elevon, told.surfaces.right_elevon, by.right_elevon),
         settled(now.left_elevon, told.surfaces.left_elevon, by.left_elevon),
         settled(now.rudder, told.surfaces.rudder, by.rudder),
         settled(now.throttle, told.throttle, by.throttle),
     )
+    return later, servos, positions(later, servos, told, end, by)

@@ -7,7 +7,7 @@ Every lane gets the bits of the scalar function. Comparisons give lanes of boole
 `select`, `&` and `|` understand; conditional expressions, `and` and `or` do not.
 
 `load` and `store` move them from and to arrays with one row for each number and one column for
-each run. Lanes exist in compiled code only; in plain Python there is one run at a time, whose
+each run; numbers of one run, from and to arrays without columns. Lanes exist in compiled code only; in plain Python there is one run at a time, whose
 numbers are floats.
 """
 
@@ -227,16 +227,18 @@ def _row(
     row: int,
     vector: ir.Type,
 ) -> ir.Value:
-    """Return the address of LANES numbers in a row of a C-contiguous array."""
+    """Return the address of a number, or of LANES, in a row of a C-contiguous array."""
     array = context.make_array(array_type)(context, builder, array)
-    step = cgutils.unpack_tuple(builder, array.shape)[1]
-    place = builder.gep(array.data, [builder.mul(step, ir.Constant(step.type, row))])
+    shape = cgutils.unpack_tuple(builder, array.shape)
+    if len(shape) == 1:
+        return builder.gep(array.data, [ir.Constant(shape[0].type, row)])
+    place = builder.gep(array.data, [builder.mul(shape[1], ir.Constant(shape[1].type, row))])
     return builder.bitcast(place, vector.as_pointer())
 
 
 def load(like: Value, array: Array) -> Value:
-    """Fill a nested tuple `like` this with lanes from successive rows of `array`."""
-    numbers = iter(array[:, 0].tolist())
+    """Fill a nested tuple `like` this with numbers or lanes from successive rows of `array`."""
+    numbers = iter(array.reshape(len(array), -1)[:, 0].tolist())
 
     def filled(part: Any) -> Any:
         if not isinstance(part, tuple):
@@ -250,15 +252,17 @@ def load(like: Value, array: Array) -> Value:
 @intrinsic
 def lanes_load(typingctx: Any, like: types.Type, array: types.Array) -> Typed:
     """`load` in compiled code."""
-    kind = _widened(like)
+    kind, filed = (_widened(like), FLOATS) if array.ndim == 2 else (like, types.float64)
 
     def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
-        vector = context.get_value_type(FLOATS)
+        vector = context.get_value_type(filed)
 
         def values() -> Iterator[ir.Value]:
-            for row, _ in enumerate(_leaves(kind)):
+            for row, (_, leaf) in enumerate(_leaves(kind)):
                 place = _row(context, builder, array, args[1], row, vector)
-                yield builder.load(place, align=8)
+                number = builder.load(place, align=8)
+                whole = leaf != filed  # an integer
+                yield builder.fptosi(number, context.get_value_type(leaf)) if whole else number
 
         return _filled(context, builder, kind, values())
 
@@ -266,7 +270,7 @@ def lanes_load(typingctx: Any, like: types.Type, array: types.Array) -> Typed:
 
 
 def store(array: Array, value: object) -> None:
-    """Write the lanes of a nested tuple, all numbers, to successive rows of a float `array`."""
+    """Write a nested tuple, all numbers or lanes, to successive rows of a float `array`."""
 
     def leaves(part: object) -> Iterator[Any]:
         if not isinstance(part, tuple):
@@ -275,15 +279,17 @@ def store(array: Array, value: object) -> None:
         for inner in part:
             yield from leaves(inner)
 
-    array[:, 0] = list(leaves(value))
+    array.reshape(len(array), -1)[:, 0] = [part for part in leaves(value) if part is not None]
 
 
 @intrinsic
 def lanes_store(typingctx: Any, array: types.Array, value: types.Type) -> Typed:
     """`store` in compiled code."""
 
+    filed = FLOATS if array.ndim == 2 else types.float64
+
     def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
-        vector = context.get_value_type(FLOATS)
+        vector = context.get_value_type(filed)
         for row, (path, leaf) in enumerate(_leaves(value)):
             part = _part(builder, args[1], path)
             if leaf == INTEGERS:
@@ -291,7 +297,7 @@ def lanes_store(typingctx: Any, array: types.Array, value: types.Type) -> Typed:
             elif leaf == BOOLEANS:
                 part = builder.uitofp(part, vector)
             else:
-                part = context.cast(builder, part, leaf, FLOATS)
+                part = context.cast(builder, part, leaf, filed)
             builder.store(part, _row(context, builder, array, args[0], row, vector), align=8)
         return context.get_dummy_value()
 
