@@ -6,8 +6,22 @@ from typing import NamedTuple
 
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_plant.dispersion import AxisDisturbance, Dispersion, Disturbance, Truth
+from ahv_plant.hardware.actuator_parameters import (
+    ACTUATOR_PARAMETERS,
+    LATENCY_PARAMETERS,
+    actuators,
+    delay_steps,
+)
+from ahv_plant.hardware.parameters import (
+    NOISE_PARAMETERS,
+    SENSOR_PARAMETERS,
+    sensor_settings,
+)
+from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
-from ahv_plant.model.vectors import State
+from ahv_plant.model.vectors import Controls, State, Surfaces
+from ahv_plant.plant import Hardware
+from ahv_plant.safe_command import SAFE_THROTTLE
 from ahv_plant.start import GEOMETRIC_ALTITUDE, START_PARAMETERS
 from ahv_plant.trim import check_flight_condition
 
@@ -38,7 +52,14 @@ DISTURBANCE_PARAMETERS = tuple(
     for axis in Disturbance._fields
     for part, words, unit, limit in _DISTURBANCE_PARTS
 )
-PLANT_PARAMETERS = FLIGHT_PARAMETERS + DISPERSION_PARAMETERS + DISTURBANCE_PARAMETERS
+HARDWARE_PARAMETERS = ACTUATOR_PARAMETERS + LATENCY_PARAMETERS + SENSOR_PARAMETERS
+PLANT_PARAMETERS = (
+    FLIGHT_PARAMETERS
+    + DISPERSION_PARAMETERS
+    + DISTURBANCE_PARAMETERS
+    + HARDWARE_PARAMETERS
+    + NOISE_PARAMETERS
+)
 
 
 class PlantSettings(NamedTuple):
@@ -47,6 +68,8 @@ class PlantSettings(NamedTuple):
     initial: State
     steps: int  # number of integration steps of 0.01 s
     truth: Truth
+    hardware: Hardware | None  # None is ideal
+    noise: tuple[int, int]  # seed of the campaign and run, of which its numbers are
 
 
 def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
@@ -70,7 +93,27 @@ def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
         raise ParameterError(
             f"plant: duration is {duration!r} s, but must be whole steps of {STEP:g} s"
         )
-    return PlantSettings(initial, steps, truth)
+    hardware = _hardware(values, initial, geometric)
+    noise = int(values["noise.seed"]), int(values["noise.run"])
+    return PlantSettings(initial, steps, truth, hardware, noise)
+
+
+def _hardware(values: Mapping[str, Value], initial: State, geometric: bool) -> Hardware | None:
+    """Hardware in SI units; None where every part is ideal."""
+    ideal = {parameter.name: parameter.default for parameter in HARDWARE_PARAMETERS}
+    if all(values[name] == ideal[name] for name in ideal if name != "failure.time"):
+        return None
+    trim = LevelTrim(*level_trim(initial.h, initial.u, initial.mass, Truth(geometric)))
+    start = Controls(Surfaces(0.0, 0.0, 0.0), SAFE_THROTTLE)
+    if trim.exists:
+        start = Controls(Surfaces(trim.elevon, trim.elevon, 0.0), trim.throttle)
+    return Hardware(
+        actuators(values),
+        delay_steps(values),
+        float(values["latency.jitter"]),
+        sensor_settings(values),
+        start,
+    )
 
 
 def _dispersion(values: Mapping[str, Value]) -> Dispersion:

@@ -12,20 +12,17 @@ from numpy.typing import NDArray
 
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.delay import line_at, through
-from ahv_plant.hardware.motion import (
-    Actuators,
-    Servos,
-    resting_servos,
-    step_on_actuators,
+from ahv_plant.hardware.motion import Actuators, Servos, resting_servos, step_on_actuators
+from ahv_plant.hardware.noise import Draws, NoiseStream, noisy_channels
+from ahv_plant.hardware.sensors import (
+    Noise,
+    SensorMemory,
+    Sensors,
+    first_measurement,
+    measure,
 )
 from ahv_plant.model.constants import STEP
-from ahv_plant.model.vectors import (
-    Controls,
-    Measurement,
-    State,
-    Surfaces,
-    limit_throttle,
-)
+from ahv_plant.model.vectors import Controls, Measurement, State, Surfaces, limit_throttle
 from ahv_plant.numerics.optional import optional
 from ahv_plant.vehicle import vehicle_step
 
@@ -35,13 +32,9 @@ class Hardware(NamedTuple):
 
     actuators: Actuators
     delay: int  # [steps] from a measured state to the arrival of its commands
+    jitter: float  # [-] share of the commands that take a step longer
+    sensors: Sensors | None
     start: Controls  # where the actuators rest before the first command arrives
-
-
-class Draws(NamedTuple):
-    """What chance has for one step."""
-
-    late: float  # 1 where the commands take a step longer, else 0
 
 
 class Rig(NamedTuple):
@@ -55,35 +48,63 @@ class Plant(NamedTuple):
     """The plant at one step."""
 
     state: State  # true
-    positions: Controls  # true, of the controls
+    controls: Controls  # true positions
     measured: Measurement
     servos: Servos | None  # None with ideal hardware
+    sensors: SensorMemory | None  # None with perfect sensors
 
 
-def make_rig(hardware: Hardware | None, lanes: int | None = None) -> Rig | None:
-    """Hardware at the start of a flight, or of one in each of so many lanes; None if ideal."""
+def rig(hardware: Hardware | None, lanes: int | None = None) -> Rig | None:
+    """Hardware before a flight, or before one in each of so many lanes; None if it is ideal."""
     return None if hardware is None else Rig(hardware, line_at(hardware.start, lanes))
 
 
+def noise_stream(hardware: Hardware, seed: int, run: int) -> NoiseStream:
+    """Draws of the run `run` of the campaign `seed` on this hardware."""
+    return NoiseStream(seed, run, noisy_channels(hardware.sensors), hardware.jitter)
+
+
+def _measured_first(
+    state: State, surfaces: Surfaces, noise: Noise, sensors: Sensors
+) -> tuple[SensorMemory, Measurement]:
+    return first_measurement(state, surfaces, noise, sensors)
+
+
+def _measured(
+    memory: SensorMemory, state: State, surfaces: Surfaces, noise: Noise, sensors: Sensors
+) -> tuple[SensorMemory, Measurement]:
+    return measure(memory, state, surfaces, noise, sensors)
+
+
+def _known_first(state: State, surfaces: Surfaces, noise: Noise) -> tuple[None, Measurement]:
+    return None, Measurement(state, surfaces)
+
+
+def _known(
+    memory: None, state: State, surfaces: Surfaces, noise: Noise
+) -> tuple[None, Measurement]:
+    return None, Measurement(state, surfaces)
+
+
+_first_look = optional(_measured_first, otherwise=_known_first)
+_look = optional(_measured, otherwise=_known)
+
+
 def _ideal_start(state: State, draws: None) -> Plant:
-    surfaces = Surfaces(0.0, 0.0, 0.0)
-    return Plant(state, Controls(surfaces, 0.0), Measurement(state, surfaces), None)
+    controls = Controls(Surfaces(0.0, 0.0, 0.0), 0.0)
+    return Plant(state, controls, Measurement(state, controls.surfaces), None, None)
 
 
 def _start(state: State, draws: Draws, rig: Rig) -> Plant:
-    hardware = rig.hardware
-    measured = Measurement(state, hardware.start.surfaces)
-    servos = resting_servos(hardware.start, hardware.actuators)
-    return Plant(state, hardware.start, measured, servos)
-
-
-# start_plant(state, draws, rig): the plant at the first state of a flight
-start_plant = optional(_start, otherwise=_ideal_start)
+    controls, sensors = rig.hardware.start, rig.hardware.sensors
+    memory, measured = _first_look(state, controls.surfaces, draws.noise, sensors)
+    servos = resting_servos(controls, rig.hardware.actuators)
+    return Plant(state, controls, measured, servos, memory)
 
 
 def _ideal_step(plant: Plant, command: Controls, number: int, truth: Truth, draws: None) -> Plant:
     state = vehicle_step(plant.state, command.surfaces, command.throttle, number * STEP, truth)
-    return Plant(state, command, Measurement(state, command.surfaces), None)
+    return Plant(state, command, Measurement(state, command.surfaces), None, None)
 
 
 def _step(
@@ -91,16 +112,19 @@ def _step(
 ) -> Plant:
     hardware = rig.hardware
     sent = Controls(command.surfaces, limit_throttle(command.throttle))
-    acting = through(rig.line, sent, number, hardware.delay, draws.late)
-    time = number * STEP
+    arrived = through(rig.line, sent, number, hardware.delay, draws.late)
     assert plant.servos is not None
     state, servos, controls = step_on_actuators(
-        plant.state, plant.servos, acting, time, truth, hardware.actuators
+        plant.state, plant.servos, arrived, number * STEP, truth, hardware.actuators
     )
-    measured = Measurement(state, controls.surfaces)
-    return Plant(state, controls, measured, servos)
+    memory, measured = _look(
+        plant.sensors, state, controls.surfaces, draws.noise, hardware.sensors
+    )
+    return Plant(state, controls, measured, servos, memory)
 
 
+# start_plant(state, draws, rig): the plant at the first state of a flight
+start_plant = optional(_start, otherwise=_ideal_start)
 # plant_step(plant, command, number, truth, draws, rig): the plant 0.01 s later; `number` counts
-# the steps flown before, `draws` are for the measurement after the step
+# the steps flown before, the draws are for the command's way and the measurement after the step
 plant_step = optional(_step, otherwise=_ideal_step)

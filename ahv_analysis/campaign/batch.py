@@ -1,6 +1,8 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """A batch of runs advanced together in lanes, and one run alone: the engine of the campaigns."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ahv_analysis.bag.record import FlightRecord
@@ -10,14 +12,17 @@ from ahv_analysis.flight.closed_loop import loop_step, start_loop
 from ahv_analysis.flight.outcome import START, Outcome, next_outcome
 from ahv_control.flight_control import FlightControl
 from ahv_plant.dispersion import Dispersion, Truth
+from ahv_plant.hardware.noise import NO_DRAWS, Channel, NoiseStream
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import STEP_NS
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.numerics.simd import LANES, load, store, widen
+from ahv_plant.plant import Hardware, rig
 from ahv_plant.termination import termination
 
 # What the rows of the arrays are: load() reads the shape of its result from these.
+BLOCK = 500  # steps of draws in memory at a time
 LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 
 
@@ -38,6 +43,46 @@ def batch_outcomes(states, dispersions, like, truth, control, steps, result):
     dispersion = load(like[1], dispersions)
     truth = Truth(truth.geometric, dispersion, truth.disturbance, truth.further, truth.wind)
     store(result, run_outcome(load(like[0], states), truth, control, steps))
+
+
+@kernel
+def begin(state, control, draws, rig):
+    """Loop and outcome before a flight on hardware; the numbers may be lanes."""
+    loop = start_loop(state, control, draws, rig)
+    return widen(loop, state.u), widen(START, state.u)
+
+
+@kernel
+def go_on(loop, outcome, first, block, like, truth, control, rig):
+    """Loop and outcome after as many steps as there are rows of draws in a block."""
+    one, altitude = loop.plant.state.u, control.outer.altitude
+    for row in range(len(block)):
+        outcome = next_outcome(outcome, loop, altitude, truth.geometric)
+        draws = load(like, block[row])
+        loop = widen(loop_step(loop, first + row, truth, control, draws, rig), one)
+    return loop, outcome
+
+
+@kernel
+def begin_batch(states, like, control, block, rig, kept):
+    """Put loop and outcome of a batch before its flight into `kept`."""
+    states, draws = load(like[0], states), load(like[1], block[0])
+    store(kept, begin(states, control, draws, rig))
+
+
+@kernel
+def go_on_batch(kept, like, dispersions, first, block, truth, control, rig):
+    """Fly a batch for a block of draws, from what was `kept` to what is."""
+    truth = Truth(truth.geometric, load(like[0], dispersions), truth.disturbance, truth.further, truth.wind)
+    loop, outcome = load(like[2], kept)
+    store(kept, go_on(loop, outcome, first, block, like[1], truth, control, rig))
+
+
+@kernel
+def end_batch(kept, like, altitude, geometric, result):
+    """Outcomes of a batch at the end of its flight."""
+    loop, outcome = load(like, kept)
+    store(result, next_outcome(outcome, loop, altitude, geometric))
 
 
 @kernel
@@ -111,6 +156,46 @@ def fly_batch(
         )
         rows.append(outcomes.T.copy())
     return np.concatenate(rows)[: len(states)]
+
+
+def fly_batch_on_hardware(
+    states: Array,
+    dispersions: Array,
+    noise: Sequence[NoiseStream],
+    truth: Truth,
+    control: FlightControl,
+    hardware: Hardware,
+    steps: int,
+) -> Array:
+    """Outcomes (N, 14) as `fly_batch`, through hardware, with the draws of every run."""
+    outcomes = np.empty((len(Outcome._fields), LANES))
+    sample = begin(State(*states[0]), control, NO_DRAWS, rig(hardware))
+    kept = np.empty((_count(sample), LANES))
+    like = (Dispersion(), NO_DRAWS, sample)
+    block = np.zeros((BLOCK, len(Channel), LANES))
+    rows = []
+    for first in range(0, len(states), LANES):
+        streams = noise[first : first + LANES]
+        equipped = rig(hardware, LANES)
+
+        def drawn(count: int, streams: Sequence[NoiseStream] = streams) -> Array:
+            for lane, stream in enumerate(streams):
+                stream.fill(block[:count, :, lane])
+            return block[:count]
+
+        begin_batch(_lanes(states, first), (LIKE[0], NO_DRAWS), control, drawn(1), equipped, kept)
+        vehicles = _lanes(dispersions, first)
+        for flown in range(0, steps, BLOCK):
+            draws = drawn(min(BLOCK, steps - flown))
+            go_on_batch(kept, like, vehicles, flown, draws, truth, control, equipped)
+        end_batch(kept, sample, control.outer.altitude, truth.geometric, outcomes)
+        rows.append(outcomes.T.copy())
+    return np.concatenate(rows)[: len(states)]
+
+
+def _count(value: object) -> int:
+    """Numbers in a nested tuple."""
+    return sum(map(_count, value)) if isinstance(value, tuple) else value is not None
 
 
 def find_trims(

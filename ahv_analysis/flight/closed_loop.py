@@ -12,9 +12,10 @@ from ahv_control.disturbance_learner import LearnerState
 from ahv_control.flight_control import FlightControl, start, step
 from ahv_control.law import Commands
 from ahv_plant.dispersion import Truth
+from ahv_plant.hardware.noise import Draws
 from ahv_plant.model.vectors import Controls, State
 from ahv_plant.numerics.elementwise import composition, elementwise
-from ahv_plant.plant import Draws, Plant, Rig, plant_step, start_plant
+from ahv_plant.plant import Plant, Rig, plant_step, start_plant
 
 
 class Loop(NamedTuple):

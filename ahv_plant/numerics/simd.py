@@ -7,8 +7,8 @@ Every lane gets the bits of the scalar function. Comparisons give lanes of boole
 `select`, `&` and `|` understand; conditional expressions, `and` and `or` do not.
 
 `load` and `store` move them from and to arrays with one row for each number and one column for
-each run; numbers of one run, from and to arrays without columns. Lanes exist in compiled code only; in plain Python there is one run at a time, whose
-numbers are floats.
+each run, or, for one run, numbers from and to arrays without columns. Lanes exist in compiled code
+only; in plain Python there is one run at a time, whose numbers are floats.
 """
 
 import math
@@ -285,7 +285,6 @@ def store(array: Array, value: object) -> None:
 @intrinsic
 def lanes_store(typingctx: Any, array: types.Array, value: types.Type) -> Typed:
     """`store` in compiled code."""
-
     filed = FLOATS if array.ndim == 2 else types.float64
 
     def emit(context: Any, builder: ir.IRBuilder, sig: Any, args: list[ir.Value]) -> ir.Value:
