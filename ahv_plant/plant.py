@@ -5,6 +5,8 @@ Commands travel, actuators move, the vehicle flies, sensors look. Ideal hardware
 act at once, and the flight software is told the state as it is.
 """
 
+from collections.abc import Iterator
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.delay import line_at, through
 from ahv_plant.hardware.motion import Actuators, Servos, resting_servos, step_on_actuators
-from ahv_plant.hardware.noise import Draws, NoiseStream, noisy_channels
+from ahv_plant.hardware.noise import Draws, NoiseStream, draws_of, noisy_channels
 from ahv_plant.hardware.sensors import (
     Noise,
     SensorMemory,
@@ -25,6 +27,8 @@ from ahv_plant.model.constants import STEP
 from ahv_plant.model.vectors import Controls, Measurement, State, Surfaces, limit_throttle
 from ahv_plant.numerics.optional import optional
 from ahv_plant.vehicle import vehicle_step
+
+DRAWN = 500  # steps of draws in memory at a time
 
 
 class Hardware(NamedTuple):
@@ -54,14 +58,24 @@ class Plant(NamedTuple):
     sensors: SensorMemory | None  # None with perfect sensors
 
 
-def rig(hardware: Hardware | None, lanes: int | None = None) -> Rig | None:
-    """Hardware before a flight, or before one in each of so many lanes; None if it is ideal."""
-    return None if hardware is None else Rig(hardware, line_at(hardware.start, lanes))
+def rig(hardware: Hardware | None) -> Rig | None:
+    """Hardware before a flight; None if it is ideal."""
+    return None if hardware is None else Rig(hardware, line_at(hardware.start))
 
 
 def noise_stream(hardware: Hardware, seed: int, run: int) -> NoiseStream:
     """Draws of the run `run` of the campaign `seed` on this hardware."""
     return NoiseStream(seed, run, noisy_channels(hardware.sensors), hardware.jitter)
+
+
+def all_draws(hardware: Hardware | None, seed: int, run: int) -> Iterator[Draws | None]:
+    """The same step by step, without end; None each time if the hardware is ideal."""
+    if hardware is None:
+        yield from repeat(None)
+        return
+    stream = noise_stream(hardware, seed, run)
+    while True:
+        yield from map(draws_of, stream.block(DRAWN))
 
 
 def _measured_first(

@@ -219,16 +219,15 @@ def bench_lanes() -> None:
     numbers = np.full((6, LANES), 0.5)
     result = np.empty((1, LANES))
     chains = 20_000_000
-    truth = case.plant.truth
     fly_batch(starts, vehicles, case.plant.truth, case.control, 2)
-    fly_alone(case.plant.initial, truth, case.control, 2)
+    fly_alone(case._replace(plant=case.plant._replace(steps=2)))
     fly_runs(campaign, 0, LANES)
     multiply_add(numbers, 10, result)
     lanes, alone, peaks = [], [], []
     for _ in range(ROUNDS):
         wall = timed(lambda: fly_batch(starts, vehicles, case.plant.truth, case.control, steps))
         lanes.append(wall / steps / LANES)
-        wall = timed(lambda: fly_alone(case.plant.initial, truth, case.control, steps))
+        wall = timed(lambda: fly_alone(case))
         alone.append(wall / steps)
         peaks.append(6 * LANES * chains / timed(lambda: multiply_add(numbers, chains, result)))
     peak, lane = median(peaks), median(lanes)

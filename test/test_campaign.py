@@ -326,7 +326,7 @@ def test_a_campaign_flies_the_disturbance_of_its_case(tmp_path):
     table = rows(tmp_path, 0.2)
     assert np.all(table["max_abs_phi_deg"] > 1e-3)
     one = pushed.case_of(7)
-    alone = fly_alone(one.plant.initial, one.plant.truth, one.control, one.plant.steps)
+    alone = fly_alone(one)
     assert math.degrees(alone.max_abs_phi) == table["max_abs_phi_deg"][7]
 
 

@@ -164,7 +164,7 @@ def test_an_outcome_is_the_same_alone_and_in_a_lane_and_true_of_the_flight(name)
     )
     for run in runs:
         one = campaign.case_of(run)
-        alone = fly_alone(one.plant.initial, one.plant.truth, one.control, one.plant.steps)
+        alone = fly_alone(one)
         assert same_bits(alone, outcomes[run]), run
     one = campaign.case_of(7)
     flown, outcome = record_of(fly(one), False), Outcome(*outcomes[7])

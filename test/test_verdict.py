@@ -24,7 +24,7 @@ def verdicts(case):
     """What a campaign makes of a case, and what the summary of its flight does."""
     steps = list(fly(case))
     found = summarize(record_of(steps, False), steps[-1].ended_early)
-    alone = fly_alone(case.plant.initial, case.plant.truth, case.control, case.plant.steps)
+    alone = fly_alone(case)
     assert found["success"] == (found["cause"] == "success")
     return Cause(int(alone.cause)).name.lower(), found["cause"]
 

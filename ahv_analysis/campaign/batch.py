@@ -5,24 +5,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahv_analysis.bag.record import FlightRecord
+from ahv_analysis.bag.record import FlightRecord, record_of
 from ahv_analysis.bag.rows import Array
 from ahv_analysis.flight.case import Case
 from ahv_analysis.flight.closed_loop import loop_step, start_loop
+from ahv_analysis.flight.library import fly
 from ahv_analysis.flight.outcome import START, Outcome, next_outcome
 from ahv_control.flight_control import FlightControl
 from ahv_plant.dispersion import Dispersion, Truth
-from ahv_plant.hardware.noise import NO_DRAWS, Channel, NoiseStream
+from ahv_plant.hardware.delay import ROWS
+from ahv_plant.hardware.noise import NO_DRAWS, Channel, NoiseStream, draws_of
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import STEP_NS
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.numerics.simd import LANES, load, store, widen
-from ahv_plant.plant import Hardware, rig
+from ahv_plant.plant import DRAWN, Hardware, Rig, noise_stream, rig
 from ahv_plant.termination import termination
 
 # What the rows of the arrays are: load() reads the shape of its result from these.
-BLOCK = 500  # steps of draws in memory at a time
 LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 
 
@@ -64,16 +65,20 @@ def go_on(loop, outcome, first, block, like, truth, control, rig):
 
 
 @kernel
-def begin_batch(states, like, control, block, rig, kept):
+def begin_batch(states, starts, like, control, block, rig, kept):
     """Put loop and outcome of a batch before its flight into `kept`."""
+    every, start = rig.hardware, load(like[2], starts)
+    hardware = Hardware(every.actuators, every.delay, every.jitter, every.sensors, start)
     states, draws = load(like[0], states), load(like[1], block[0])
-    store(kept, begin(states, control, draws, rig))
+    store(kept, begin(states, control, draws, Rig(hardware, rig.line)))
 
 
 @kernel
 def go_on_batch(kept, like, dispersions, first, block, truth, control, rig):
     """Fly a batch for a block of draws, from what was `kept` to what is."""
-    truth = Truth(truth.geometric, load(like[0], dispersions), truth.disturbance, truth.further, truth.wind)
+    truth = Truth(
+        truth.geometric, load(like[0], dispersions), truth.disturbance, truth.further, truth.wind
+    )
     loop, outcome = load(like[2], kept)
     store(kept, go_on(loop, outcome, first, block, like[1], truth, control, rig))
 
@@ -118,6 +123,9 @@ def _keep(row, state, answer, states, commands):
 
 def fly_trajectory(case: Case, every: int) -> FlightRecord:
     """Fly a case alone and keep every so many of its steps, to be drawn."""
+    if case.plant.hardware is not None:
+        kept = (step for step in fly(case) if step.stamp % (every * STEP_NS) == 0)
+        return record_of(kept, case.plant.truth.geometric)
     steps, truth = case.plant.steps, case.plant.truth
     states = np.empty((steps // every + 1, len(State._fields)))
     commands = np.empty((steps // every + 1, 10))
@@ -161,32 +169,39 @@ def fly_batch(
 def fly_batch_on_hardware(
     states: Array,
     dispersions: Array,
+    starts: Array,
     noise: Sequence[NoiseStream],
     truth: Truth,
     control: FlightControl,
     hardware: Hardware,
     steps: int,
 ) -> Array:
-    """Outcomes (N, 14) as `fly_batch`, through hardware, with the draws of every run."""
+    """Outcomes (N, 14) as `fly_batch`, on hardware, with the draws of every run.
+
+    The actuators rest at `starts` (N, 4), in the order of `Controls`, until they are told.
+    """
     outcomes = np.empty((len(Outcome._fields), LANES))
     sample = begin(State(*states[0]), control, NO_DRAWS, rig(hardware))
     kept = np.empty((_count(sample), LANES))
     like = (Dispersion(), NO_DRAWS, sample)
-    block = np.zeros((BLOCK, len(Channel), LANES))
+    block = np.zeros((DRAWN, len(Channel), LANES))
     rows = []
     for first in range(0, len(states), LANES):
         streams = noise[first : first + LANES]
-        equipped = rig(hardware, LANES)
+        line = np.array([_lanes(starts, first)] * ROWS)
+        equipped = Rig(hardware, line)
 
         def drawn(count: int, streams: Sequence[NoiseStream] = streams) -> Array:
             for lane, stream in enumerate(streams):
                 stream.fill(block[:count, :, lane])
             return block[:count]
 
-        begin_batch(_lanes(states, first), (LIKE[0], NO_DRAWS), control, drawn(1), equipped, kept)
+        first_states, controls = _lanes(states, first), _lanes(starts, first)
+        wanted = (LIKE[0], NO_DRAWS, hardware.start)
+        begin_batch(first_states, controls, wanted, control, drawn(1), equipped, kept)
         vehicles = _lanes(dispersions, first)
-        for flown in range(0, steps, BLOCK):
-            draws = drawn(min(BLOCK, steps - flown))
+        for flown in range(0, steps, DRAWN):
+            draws = drawn(min(DRAWN, steps - flown))
             go_on_batch(kept, like, vehicles, flown, draws, truth, control, equipped)
         end_batch(kept, sample, control.outer.altitude, truth.geometric, outcomes)
         rows.append(outcomes.T.copy())
@@ -214,9 +229,18 @@ def find_trims(
     return np.concatenate(rows)[: len(dispersions)]
 
 
-def fly_alone(state: State, truth: Truth, control: FlightControl, steps: int) -> Outcome:
+def fly_alone(case: Case) -> Outcome:
     """Outcome of one run by scalar code: the same bits as in a lane."""
-    return Outcome(*run_outcome(state, truth, control, steps))
+    state, steps, truth, hardware, noise = case.plant
+    if hardware is None:
+        return Outcome(*run_outcome(state, truth, case.control, steps))
+    equipped, stream = rig(hardware), noise_stream(hardware, *noise)
+    loop, outcome = begin(state, case.control, draws_of(stream.block(1)[0]), equipped)
+    for flown in range(0, steps, DRAWN):
+        block = stream.block(min(DRAWN, steps - flown))
+        loop, outcome = go_on(loop, outcome, flown, block, NO_DRAWS, truth, case.control, equipped)
+    altitude = case.control.outer.altitude
+    return Outcome(*next_outcome(outcome, loop, altitude, truth.geometric))
 
 
 def _lanes(rows: Array, first: int) -> Array:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ahv_analysis.bag.rows import Array
-from ahv_analysis.campaign.batch import find_trims, fly_alone, fly_batch
+from ahv_analysis.campaign.batch import find_trims, fly_alone, fly_batch, fly_batch_on_hardware
 from ahv_analysis.campaign.store import (
     PART_RUNS,
     Columns,
@@ -37,6 +37,7 @@ from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.identity import Definition
+from ahv_plant.plant import noise_stream
 
 RUNS_PER_JOB = 64  # four batches: half a second of work, so that little is lost and little waits
 LOOK = 0.2  # [s] between looks for an interruption
@@ -81,6 +82,13 @@ class Campaign:
         """First state of a run."""
         return self.case_of(run).plant.initial if self.random_starts else self.case.plant.initial
 
+    def controls(self, run: int) -> tuple[float, ...]:
+        """Where the actuators rest before the run, on hardware, in the order of `Controls`."""
+        case = self.case_of(run) if self.random_starts else self.case
+        assert case.plant.hardware is not None
+        start = case.plant.hardware.start
+        return *start.surfaces, start.throttle
+
     def case_of(self, run: int) -> Case:
         """Return the case that flies one run alone, with the same bits, by any engine."""
         plant = self.case.parameters["plant"] | dispersion_parameters(self.dispersion(run))
@@ -90,6 +98,8 @@ class Campaign:
             )
             for (name, spread), draw in zip(START_SPREAD.items(), draws.tolist(), strict=True):
                 plant[name] = float(plant[name]) + spread * draw
+        if self.case.plant.hardware is not None:
+            plant |= {"noise.seed": self.seed, "noise.run": run}
         draw = Draw(self.level, self.seed, run, self.random_starts)
         return make_case(self.case.name, self.case.parameters | {"plant": plant}, draw)
 
@@ -100,8 +110,15 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     dispersions = np.array([campaign.dispersion(run) for run in runs])
     states = np.array([campaign.start(run) for run in runs])
     case = campaign.case
-    control, (initial, steps, truth) = case.control, case.plant
-    outcomes = fly_batch(states, dispersions, truth, control, steps)
+    control, (initial, steps, truth, hardware, _) = case.control, case.plant
+    if hardware is None:
+        outcomes = fly_batch(states, dispersions, truth, control, steps)
+    else:
+        noise = [noise_stream(hardware, campaign.seed, run) for run in runs]
+        starts = np.array([campaign.controls(run) for run in runs])
+        outcomes = fly_batch_on_hardware(
+            states, dispersions, starts, noise, truth, control, hardware, steps
+        )
     trims = find_trims(
         dispersions,
         control.outer.altitude,
@@ -115,8 +132,8 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
 def fly_again(campaign: Campaign, run: int) -> Columns:
     """Fly one run by scalar code: the columns of its row, with the same bits."""
     case = campaign.case_of(run)
-    control, (initial, steps, truth) = case.control, case.plant
-    outcome = fly_alone(initial, truth, control, steps)
+    control, initial, truth = case.control, case.plant.initial, case.plant.truth
+    outcome = fly_alone(case)
     altitude, speed = control.outer.altitude, control.velocity.speed
     trim = level_trim(altitude, speed, initial.mass, in_calm(truth))
     return _columns(*map(np.array, ([run], [truth.dispersion], [initial], [outcome], [trim])))

@@ -29,6 +29,7 @@ from ahv_msgs_py.topics import (
 )
 from ahv_plant.model.constants import STEP, STEP_NS
 from ahv_plant.model.vectors import Rates
+from ahv_plant.plant import all_draws, rig
 from ahv_plant.termination import termination_reason
 
 CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
@@ -37,10 +38,11 @@ INTERRUPTED = "interrupted"  # why a flight ended early, where a signal does not
 
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the model no longer describes the vehicle."""
-    truth, control = case.plant.truth, case.control
-    loop = start_loop(case.plant.initial, control, None, None)
+    truth, control, equipped = case.plant.truth, case.control, rig(case.plant.hardware)
+    draws = all_draws(case.plant.hardware, *case.plant.noise)
+    loop = start_loop(case.plant.initial, control, next(draws), equipped)
     for number in range(case.plant.steps):
-        later = loop_step(loop, number, truth, control, None, None)
+        later = loop_step(loop, number, truth, control, next(draws), equipped)
         reason = termination_reason(later.plant.state, truth.geometric, (number + 1) * STEP)
         yield _step(number, loop, reason)
         if reason:

@@ -31,11 +31,11 @@ class Actuator(NamedTuple):
     order: int  # 0 moves at once; 1 or 2 is the order of the servo
     frequency: float  # [rad/s] natural frequency; of first order the bandwidth
     damping: float  # [-] of second order
-    rate_limit: float  # [1/s] times the unit of position; infinity is off
-    lower: float  # stop
-    upper: float  # stop
-    dead_zone: float  # error to either side that the servo does not notice
-    backlash: float  # play between servo and what it moves, end to end
+    rate_limit: float  # units of position a second; infinity is off
+    lower: float  # stop, in the units of position
+    upper: float  # stop, in the units of position
+    dead_zone: float  # units of position, to either side: what the servo does not notice
+    backlash: float  # units of position, end to end: play between servo and what it moves
     failure: int = Failure.NONE
     failure_time: float = 0.0  # [s] from when on
 
@@ -43,14 +43,14 @@ class Actuator(NamedTuple):
 class Servo(NamedTuple):
     """State of an actuator; also its rates, by second."""
 
-    position: float  # of the servo
-    rate: float  # of second order
-    output: float  # position of what it moves: its own but for the play
+    position: float  # of the servo, in the units of what it moves
+    rate: float  # of second order, units of position a second
+    output: float  # of what it moves, in units of position: its own but for the play
 
 
 @elementwise
 def resting(position: float, actuator: Actuator) -> Servo:
-    """Servo at rest, with what it moves at `position`."""
+    """Servo at rest, with what it moves at `position`, in any unit."""
     held = clamp(position, actuator.lower, actuator.upper)
     return Servo(held, 0.0 * held, held)
 
@@ -67,7 +67,7 @@ def ordered(servo: Servo, command: float, time: float, actuator: Actuator) -> fl
 
 @elementwise
 def servo_rate(servo: Servo, told: float, time: float, actuator: Actuator) -> Servo:
-    """Rates of the servo's states on its way to what it was `told`.
+    """Rates of the servo's states on its way to what it was `told`, at `time` [s].
 
     First order: x' = w e; second order: x'' = w (w e - 2 zeta x'), with the error e behind the
     dead zone and x' within the rate limit, beyond which it does not wind up.
@@ -88,7 +88,7 @@ def servo_rate(servo: Servo, told: float, time: float, actuator: Actuator) -> Se
 
 @elementwise
 def moved(servo: Servo, told: float, actuator: Actuator) -> float:
-    """Position of what the servo moves: within the play it stays where it was."""
+    """Position of what the servo moves, in any unit: within the play it stays where it was."""
     play = 0.5 * actuator.backlash
     dragged = clamp(servo.output, servo.position - play, servo.position + play)
     return select(actuator.order == 0, told, dragged)
@@ -96,14 +96,14 @@ def moved(servo: Servo, told: float, actuator: Actuator) -> float:
 
 @elementwise
 def in_the_wind(position: float, wind: float, time: float, actuator: Actuator) -> float:
-    """Where a surface is: where it was moved to, or, afloat, where the `wind` turns it."""
+    """Where a surface is [rad]: where it was moved to, or, afloat, where the `wind` turns it."""
     afloat = (time >= actuator.failure_time) & (actuator.failure == 2)
     return select(afloat, clamp(wind, actuator.lower, actuator.upper), position)
 
 
 @elementwise
 def effect(position: float, time: float, actuator: Actuator) -> float:
-    """Position of a whole surface that would have the effect of this one."""
+    """Position, in any unit, of a whole one that would have the effect of this at `time` [s]."""
     half = (time >= actuator.failure_time) & (actuator.failure == 5)
     return select(half, 0.5 * position, position)
 
@@ -118,7 +118,7 @@ def along_servo(servo: Servo, rate: Servo, time: float) -> Servo:
 
 @elementwise
 def settled(servo: Servo, told: float, actuator: Actuator) -> Servo:
-    """Servo at the end of a step: at a stop it stands still, and drags along what it moves."""
+    """Servo at the end of a step, in any unit: it stands at a stop, and drags what it moves."""
     reached = clamp(servo.position, actuator.lower, actuator.upper)
     reached = select(actuator.order == 0, told, reached)
     rate = select(reached == servo.position, servo.rate, 0.0 * reached)

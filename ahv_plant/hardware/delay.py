@@ -17,10 +17,12 @@ ROWS = LONGEST + 2  # the newest, the longest delay, and a step of jitter
 _LIKE = Controls(Surfaces(0.0, 0.0, 0.0), 0.0)
 
 
-def line_at(start: Controls, lanes: int | None = None) -> NDArray[np.float64]:
-    """Line (ROWS, 4[, lanes]) before the first command: what arrives from it is `start`."""
-    row = np.array([*start.surfaces, start.throttle])
-    return np.array([row if lanes is None else np.repeat(row[:, None], lanes, 1)] * ROWS)
+def line_at(start: Controls) -> NDArray[np.float64]:
+    """Line (ROWS, 4[, lanes]) before the first command: what arrives from it is `start`.
+
+    Its numbers may be arrays (lanes,).
+    """
+    return np.array([[*start.surfaces, start.throttle]] * ROWS)
 
 
 @elementwise
@@ -29,8 +31,8 @@ def through(
 ) -> Controls:
     """Send the `controls` of a step and return those that arrive at it.
 
-    `delay` [steps]; where `late` is 1 what should arrive comes a step later, and what came before
-    stays in force; 0 else.
+    `delay` is in steps of 0.01 s; where `late` [-] is 1 what should arrive comes a step later, and
+    what came before stays in force; else it is 0.
     """
     store(line[step % ROWS], controls)
     due = load(_LIKE, line[(step - delay + ROWS) % ROWS])

@@ -54,7 +54,7 @@ def resting_servos(start: Controls, by: Actuators) -> Servos:
 
 @elementwise
 def told_servos(servos: Servos, command: Controls, time: float, by: Actuators) -> Controls:
-    """Where the servos are told to go."""
+    """Where the servos are told to go at `time` [s]."""
     return Controls(
         Surfaces(
             ordered(servos.right_elevon, command.surfaces.right_elevon, time, by.right_elevon),
@@ -67,7 +67,7 @@ def told_servos(servos: Servos, command: Controls, time: float, by: Actuators) -
 
 @elementwise
 def servo_rates(servos: Servos, told: Controls, time: float, by: Actuators) -> Servos:
-    """Rates of all servos."""
+    """Rates of all servos at `time` [s]."""
     surfaces = told.surfaces
     return Servos(
         servo_rate(servos.right_elevon, surfaces.right_elevon, time, by.right_elevon),
@@ -92,7 +92,7 @@ def along_servos(servos: Servos, rates: Servos, time: float) -> Servos:
 def positions(
     state: State, servos: Servos, told: Controls, time: float, by: Actuators
 ) -> Controls:
-    """Where the controls are; surfaces afloat lie in the wind, elevons at -alpha, rudder beta."""
+    """Where the controls are at `time` [s]; what is afloat lies in the wind, at -alpha or beta."""
     alpha = atan2(state.w, state.u)
     beta = atan2(state.v, abs(state.u))
     surfaces = told.surfaces
@@ -114,7 +114,7 @@ def positions(
 def rate_on_actuators(
     state: State, servos: Servos, told: Controls, time: float, truth: Truth, by: Actuators
 ) -> State:
-    """Rates of the vehicle's states with the controls where the servos have them."""
+    """Rates of the vehicle's states at `time` [s], with the controls where the servos are."""
     at = positions(state, servos, told, time, by)
     acting = Surfaces(
         effect(at.surfaces.right_elevon, time, by.right_elevon),
