@@ -18,8 +18,10 @@ exec "$(dirname "$0")/../../bin/{program}" "$@"
 # The commands and their functions. Those of pip lie in bin/, among everybody's, and have a prefix;
 # those of colcon lie in lib/ahv, where `ros2 run` looks.
 PIP = {"dist_info", "bdist_wheel", "editable_wheel"} & {*sys.argv}
-PROGRAMS = {"ahv": ("ahv", "ahv_analysis.command.main")}
-PROGRAMS |= {name: (f"ahv-{name}" if PIP else name, node.module) for name, node in NODES.items()}
+PROGRAMS = {"ahv": ("ahv", "ahv_analysis.command.main:main")}
+PROGRAMS |= {
+    name: (f"ahv-{name}" if PIP else name, f"ahv_msgs_py.program:{name}") for name in NODES
+}
 DATA = [
     ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
     (f"share/{NAME}", ["package.xml"]),
@@ -88,7 +90,7 @@ setup(
         ],
     },
     entry_points={
-        "console_scripts": [f"{program} = {module}:main" for program, module in PROGRAMS.values()]
+        "console_scripts": [f"{program} = {function}" for program, function in PROGRAMS.values()]
     },
     zip_safe=True,
 )

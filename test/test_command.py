@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from ahv_analysis.command.app import app
 from ahv_analysis.flight.case import case_names
+from ahv_msgs_py.node.faults import fault_rows
 from ahv_plant.model.vectors import State
 
 
@@ -126,6 +127,14 @@ def test_a_full_disk_is_named():
 
 def test_a_terminal_without_width_shows_all():
     assert ahv("trim", COLUMNS="0").stdout == ahv("trim").stdout
+
+
+def test_eighty_columns_cut_no_word_of_the_faults():
+    words = ahv("faults", COLUMNS="80").stdout
+    assert max(map(len, words.splitlines())) <= 80
+    assert {word for row in fault_rows() for text in row for word in text.split()} <= {
+        *words.split()
+    }
 
 
 ODD = "x[/red] [bold]Grün :smile: \udcff"  # markup, an emoji code, and a byte that is no text

@@ -32,7 +32,7 @@ def wait_until(true):
     deadline = time.monotonic() + PATIENCE
     while not true():
         assert time.monotonic() < deadline
-        time.sleep(0.1)
+        time.sleep(0.02)
 
 
 def test_nodes_end_with_the_command_that_is_killed(tmp_path):
@@ -133,6 +133,31 @@ def test_an_interrupted_command_ends_though_the_middleware_hangs(tmp_path):
     assert flown.returncode == 128 + signal.SIGINT
     assert "interrupted at" in said
     assert (tmp_path / "bag" / "metadata.yaml").is_file()
+
+
+def test_a_signal_while_a_node_is_imported_ends_it_without_a_word():
+    """From the first moment on that is a program's own, and whatever it is at."""
+    command = [sys.executable, "-c", "from ahv_msgs_py.program import velocity; velocity()"]
+    command = ["env", "--default-signal=INT", *command, "--ros-args", "--log-level", "error"]
+    command += ["--params-file", config_folder() / "cases" / "nominal_di.yaml"]
+    codes = []
+    for moment in (0.0, 0.1, 0.2, 0.4, 0.8):
+        node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        wait_until(lambda node=node: catches(node.pid, signal.SIGHUP))
+        time.sleep(moment)
+        node.send_signal(signal.SIGINT)
+        _, said = node.communicate(timeout=PATIENCE)
+        assert said == ""
+        codes.append(node.returncode)
+    assert codes[0] == 128 + signal.SIGINT
+    assert {*codes} <= {128 + signal.SIGINT, 0}  # 0: it was a node already, and ended in order
+
+
+def catches(pid, number):
+    """Whether a process has a handler for a signal."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    (caught,) = [line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")]
+    return bool(int(caught, 16) >> (number - 1) & 1)
 
 
 def test_a_node_is_sent_two_signals_at_once():

@@ -186,7 +186,7 @@ def test_one_entry_adds_a_node_to_all_that_start_nodes(monkeypatch, launch, sour
     graph = sources / "ahv_msgs_py" / "graph.py"
     graph.write_text(graph.read_text().replace("_NODES = (\n", f"_NODES = (\n{ADDED}"))
     given = handed_over(monkeypatch, sources, "bdist_wheel")
-    assert executables(given)["ahv-guidance"] == "ahv_control.velocity_node:main"
+    assert executables(given)["ahv-guidance"] == "ahv_msgs_py.program:guidance"
     assert "build/launchers/guidance" in dict(given["data_files"])["lib/ahv"]
     node = runpy.run_path(str(graph))["NODES"]["guidance"]
     monkeypatch.setitem(NODES, "guidance", node)

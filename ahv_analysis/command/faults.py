@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Column, Table
+from rich.table import Table
 
 from ahv_analysis.command.console import (
     Json,
@@ -38,8 +38,13 @@ def show(context: typer.Context, as_json: Json = False) -> None:
     if as_json:
         print_json({"faults": [dict(zip(COLUMNS, row, strict=True)) for row in rows]})
         return
-    sheet = Table(Column(COLUMNS[0], no_wrap=True), *COLUMNS[1:], show_lines=True)
-    for row in rows:
+    # the names one below the other, and columns so wide that 80 characters cut no word of any
+    shown = [(f"{fault}\n{by}", *words) for fault, by, *words in rows]
+    sheet = Table(show_lines=True)
+    for heads, cells in zip((COLUMNS[:2], *COLUMNS[2:]), zip(*shown, strict=True), strict=True):
+        head = "\n".join(heads) if isinstance(heads, tuple) else heads
+        sheet.add_column(head, min_width=max(map(len, " ".join((head, *cells)).split())))
+    for row in shown:
         sheet.add_row(*row)
     console.print(sheet)
 

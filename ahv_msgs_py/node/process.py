@@ -18,11 +18,11 @@ from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameter_file import given_files
 from ahv_msgs_py.parameters import ParameterError
+from ahv_msgs_py.program import SIGNALS
 
 LOOK = 0.2  # [s] between looks for a signal; a finite time, or the executor spins
 SETTLE = 0.05  # [s] of the executor at the end
 LONGEST_TEARDOWN = 2.0  # [s] of a node that has done what it had to
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def run(node_class: Callable[[], BaseNode]) -> None:
