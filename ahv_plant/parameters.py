@@ -5,7 +5,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
-from ahv_plant.dispersion import AxisDisturbance, Dispersion, Disturbance, Truth
+from ahv_plant.dispersion import (
+    AxisDisturbance,
+    Dispersion,
+    Disturbance,
+    FurtherDispersion,
+    Truth,
+)
 from ahv_plant.hardware.actuator_parameters import (
     ACTUATOR_PARAMETERS,
     LATENCY_PARAMETERS,
@@ -17,6 +23,7 @@ from ahv_plant.hardware.parameters import (
     SENSOR_PARAMETERS,
     sensor_settings,
 )
+from ahv_plant.hardware.wind_parameters import WIND_PARAMETERS, wind_settings
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
 from ahv_plant.model.vectors import Controls, State, Surfaces
@@ -47,6 +54,22 @@ DISPERSION_PARAMETERS = tuple(
     Parameter(f"dispersion.{name}", 1.0, f"multiplier of the true {name}", "", 0.05, 5.0)
     for name in Dispersion._fields
 )
+_FURTHER = {  # what of it is multiplied
+    "mass": "mass, against that of the state",
+    "density": "density of the air",
+    "temperature": "temperature of the air",
+    "thrust": "thrust",
+    "right_elevon": "effectiveness of the right elevon",
+    "left_elevon": "effectiveness of the left elevon",
+    "rudder": "effectiveness of the rudder",
+}
+FURTHER_PARAMETERS = (
+    *(
+        Parameter(f"dispersion.{name}", 1.0, f"multiplier of the true {words}", "", 0.05, 5.0)
+        for name, words in _FURTHER.items()
+    ),
+    Parameter("dispersion.X_cg", 0.0, "shift aft of the true centre of gravity", "m", -5.0, 5.0),
+)
 DISTURBANCE_PARAMETERS = tuple(
     Parameter(f"disturbance.{axis}.{part}", 0.0, f"rate of {axis}: {words}", unit, -limit, limit)
     for axis in Disturbance._fields
@@ -56,7 +79,9 @@ HARDWARE_PARAMETERS = ACTUATOR_PARAMETERS + LATENCY_PARAMETERS + SENSOR_PARAMETE
 PLANT_PARAMETERS = (
     FLIGHT_PARAMETERS
     + DISPERSION_PARAMETERS
+    + FURTHER_PARAMETERS
     + DISTURBANCE_PARAMETERS
+    + WIND_PARAMETERS
     + HARDWARE_PARAMETERS
     + NOISE_PARAMETERS
 )
@@ -86,7 +111,13 @@ def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
         check_flight_condition(initial.h, initial.u, initial.mass, geometric)
     except ValueError as error:
         raise ParameterError(f"plant: initial {error}") from error
-    truth = Truth(geometric, _dispersion(values), _disturbance(values))
+    truth = Truth(
+        geometric,
+        _dispersion(values),
+        _disturbance(values),
+        _further_dispersion(values),
+        wind_settings(values),
+    )
     duration = float(values["duration"])
     steps = round(duration / STEP)
     if abs(steps * STEP - duration) > 1e-9:
@@ -118,6 +149,14 @@ def _hardware(values: Mapping[str, Value], initial: State, geometric: bool) -> H
 
 def _dispersion(values: Mapping[str, Value]) -> Dispersion:
     return Dispersion(*(float(values[parameter.name]) for parameter in DISPERSION_PARAMETERS))
+
+
+def _further_dispersion(values: Mapping[str, Value]) -> FurtherDispersion | None:
+    """None where all is nominal."""
+    further = FurtherDispersion(
+        *(float(values[f"dispersion.{name}"]) for name in FurtherDispersion._fields)
+    )
+    return None if further == FurtherDispersion() else further
 
 
 def _disturbance(values: Mapping[str, Value]) -> Disturbance | None:

@@ -37,6 +37,7 @@ OWN |= {
     "ahv_plant.hardware.delay",
     "ahv_plant.hardware.motion",
     "ahv_plant.hardware.parameters",
+    "ahv_plant.hardware.wind_parameters",
     "ahv_control.parameters",
     "ahv_control.learner_message",
 }

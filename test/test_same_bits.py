@@ -17,7 +17,12 @@ from ahv_plant.model.vectors import Rates
 from ahv_plant.model import aerodynamic_fits
 from ahv_plant.numerics import elementary
 from ahv_plant.model.atmosphere import atmosphere
-from ahv_plant.dispersion import AxisDisturbance, Disturbance, Truth, draw_dispersion
+from ahv_plant.dispersion import (
+    AxisDisturbance, Disturbance, FurtherDispersion, Truth, draw_dispersion
+)
+from ahv_plant.hardware.wind import (
+    CALM, Gust, SteadyWind, Wind, turbulence_of, turbulence_step
+)
 from ahv_plant.model.vectors import State, Surfaces
 from ahv_plant.vehicle import state_rate, vehicle_step
 
@@ -61,6 +66,17 @@ for run in range(100):
     demand = Rates(*(draw.uniform(-0.5, 0.5) for _ in range(3)))
     show("rate", state_rate(state, surfaces, 0.3, 5.0, truth))
     show("step", vehicle_step(state, surfaces, 0.3, 5.0, truth))
+    further = FurtherDispersion(*(draw.uniform(0.7, 1.3) for _ in FurtherDispersion._fields))
+    turbulence = turbulence_of(draw.uniform(0.0, 9.0), draw.uniform(1200.0, 5000.0))
+    air = CALM
+    for _ in range(3):
+        air = turbulence_step(air, tuple(draw.gauss(0.0, 1.0) for _ in "uvw"), turbulence)
+    wind = Wind(
+        SteadyWind(draw.uniform(-90, 90), draw.uniform(-90, 90), 24000.0, 0.01, -0.02),
+        Gust(3.0, 5.0, draw.uniform(-20, 20), 4.5, draw.uniform(0.4, 2.0)),
+    )
+    open_world = truth._replace(further=further, wind=wind)
+    show("open world", vehicle_step(state, surfaces, 0.3, 5.0, open_world, air))
     show("jacobian", angular_response(flight_condition(state, False), surfaces))
     show("power", elementary.power(draw.uniform(0.08, 1.0), draw.uniform(-2.0, 2.0)))
     show("solver", solve_surfaces(state, demand, surfaces, False))
@@ -86,5 +102,5 @@ def test_plain_floats_and_compiled_code_agree_in_every_bit():
     cases = ["nominal_di", "neuro_adaptive_di", "neuro_adaptive_sc_gdi_protected"]
     compiled = run(cases, NUMBA_DISABLE_JIT="0")
     plain = run(cases, NUMBA_DISABLE_JIT="1")
-    assert len(compiled) == 22 + 6 + 2 + 500 + 201 * len(cases)
+    assert len(compiled) == 22 + 6 + 2 + 600 + 201 * len(cases)
     assert compiled == plain

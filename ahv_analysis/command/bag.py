@@ -26,7 +26,6 @@ bag = typer.Typer(
 Folder = Annotated[
     Path, typer.Argument(metavar="BAG", help="Folder of a bag or of a flight, or an MCAP file.")
 ]
-UNDISPERSED = 1.0
 
 
 @bag.command()
@@ -50,6 +49,7 @@ def info(path: Folder, as_json: Json = False) -> None:
 
 def _rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     from ahv_analysis.bag.info import refused_words
+    from ahv_msgs_py.graph import NODES
 
     rows = [
         ("case", facts["case"] or "unknown: it has no notes of ahv"),
@@ -60,10 +60,11 @@ def _rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
         rows.append(("refused", refused_words(facts["refused"])))
     if facts["notes"]:
         plant = facts["notes"]["parameters"]["plant"]
+        nominal = {parameter.name: parameter.default for parameter in NODES["plant"].parameters}
         dispersed = [
             f"{name.removeprefix('dispersion.')} {value}"
             for name, value in plant.items()
-            if name.startswith("dispersion.") and value != UNDISPERSED
+            if name.startswith("dispersion.") and value != nominal.get(name)
         ]
         rows.append(("dispersion", ", ".join(dispersed) or "none"))
     return [*rows, ("size", f"{facts['messages']} messages, {facts['bytes'] / 1e6:.1f} MB")]

@@ -130,7 +130,10 @@ def fly(
     flown = record.stamps[-1] // STEP_NS if ended_early else flight.plant.steps
     missing = missing_states(contents, int(flown))
     summary: dict[str, Any] = {"case": flight.name, "engine": engine.value, "bag": str(bag)}
-    summary["dispersion"] = flight.plant.truth.dispersion._asdict()
+    truth = flight.plant.truth
+    summary["dispersion"] = truth.dispersion._asdict()
+    if truth.further is not None:
+        summary["dispersion"] |= truth.further._asdict()
     summary |= summarize(record, ended_early, missing)
     summary["refused"] = refused_facts(contents)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}

@@ -25,6 +25,8 @@ from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
 from ahv_plant.parameters import PlantSettings, plant_settings
 
+TRUE = ("dispersion.", "disturbance.", "wind.", "gust.", "turbulence.")  # of the plant alone
+
 
 class Draw(NamedTuple):
     """Where a drawn vehicle comes from: it can be drawn again, with the same bits."""
@@ -91,10 +93,10 @@ def load_dispersion(path: Path, namespace: str = NAMESPACE) -> dict[str, object]
     given = read_case_file(path, namespace)
     for node, values in given.items():
         for name in values:
-            if node != "plant" or not name.startswith(("dispersion.", "disturbance.")):
+            if node != "plant" or not name.startswith(TRUE):
                 raise ParameterError(
                     f"{path.name}: {node}: {name} has no place in a dispersion file; "
-                    "valid are the plant's dispersion and disturbance"
+                    f"valid are the plant's {'*, '.join(TRUE)}*"
                 )
     return given["plant"]
 
