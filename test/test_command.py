@@ -269,6 +269,8 @@ def test_figures_of_a_bag(flown, tmp_path):
         (("figures", "nothing", "--out", "x"), ("nothing is not a bag",)),
         (("trim", "--altitude", "high"), ("--altitude", "high")),
         (("fly", "n" * 300), ("name too long",)),
+        (("fly", "nominal_di", "--namespace", "2nd car"), ("namespace /2nd car", "like /uav1")),
+        (("fly", "nominal_di", "--namespace", "a", "--engine", "library"), ("--namespace",)),
     ],
 )
 def test_wrong_input_is_named(arguments, words, tmp_path):

@@ -21,6 +21,7 @@ from ahv_msgs_py.topics import (
     relative,
     within,
 )
+from test.test_command import ahv as command
 from test.test_replay import ahv  # noqa: F401  the command in this process
 
 CASES = {"/uav1": "nominal_di", "/fleet/uav2": "neuro_adaptive_di"}
@@ -121,3 +122,15 @@ def test_names_within_a_namespace():
     assert within("/uav1", STATE.name) == "/uav1/state"
     assert within("/", STATE.name) == "/state"
     assert within("/uav1", CLOCK.name) == "/clock"
+
+
+@pytest.mark.parametrize("way", [(), ("--processes",)])
+def test_the_command_flies_in_a_namespace(way, tmp_path):
+    flight = ("fly", "nominal_di", "--duration", 5, "--namespace", "fleet/uav1", *way)
+    flown = command(*flight, "--out", tmp_path, domain=101)
+    assert flown.returncode == 0, flown.stderr
+    bag = read(tmp_path / "bag")
+    assert bag.namespace == "/fleet/uav1"
+    assert not {name for name in bag.topics if name.startswith("/ahv/")}
+    alone = [list(step.state) for step in fly(load_case("nominal_di", DURATION))]
+    assert read_bag(tmp_path / "bag").states.tolist() == alone

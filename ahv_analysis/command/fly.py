@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import time
 from collections.abc import Callable
 from enum import StrEnum
@@ -27,6 +28,7 @@ from ahv_analysis.command.console import (
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_msgs_py.node.network import DISCOVERY_RANGE
+from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP, STEP_NS
 
@@ -42,6 +44,7 @@ class CaseCommand(TyperCommand):
             formatter.write_text(", ".join(case_names()))
 
 
+NAMES = re.compile("(/[A-Za-z_][A-Za-z0-9_]*)+")  # as ROS has them
 INCOMPLETE = 3  # exit code of a flight that the bag does not hold all of
 
 
@@ -66,6 +69,9 @@ def fly(
     network: Annotated[
         bool, typer.Option("--network", help="Let other machines hear the graph, and speak to it.")
     ] = False,
+    namespace: Annotated[
+        str, typer.Option(help="Of nodes and topics: vehicles in one ROS domain differ in it.")
+    ] = NAMESPACE,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for the bag and the summary, which must not have them."),
@@ -94,14 +100,21 @@ def fly(
     from ahv_analysis.flight.library import fly_library
     from ahv_analysis.report.summary import missing_states, summarize
 
-    if engine == Engine.library and (realtime or processes or network):
+    namespace = f"/{namespace.strip('/')}"
+    if not NAMES.fullmatch(namespace):
         raise UsageError(
-            "--realtime, --processes and --network are for the graph, not for --engine library"
+            f"namespace {namespace} is not one or several names of letters, digits and _, "
+            "each after a / and none with a digit first, like /uav1"
         )
-    changes, draw = _dispersion(dispersion, seed, run)
+    if engine == Engine.library and (realtime or processes or network or namespace != NAMESPACE):
+        raise UsageError(
+            "--realtime, --processes, --network and --namespace are for the graph, "
+            "not for --engine library"
+        )
+    changes, draw = _dispersion(dispersion, seed, run, namespace)
     if duration is not None:
         changes["duration"] = duration
-    flight = load_case(case, changes, draw)
+    flight = load_case(case, changes, draw, namespace)
     folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     bag, summary_file = folder / "bag", folder / "summary.json"
     for path in (bag, summary_file):
@@ -119,7 +132,9 @@ def fly(
                     f"{DISCOVERY_RANGE} is OFF, so that processes do not hear each other: unset it"
                 )
             fly_ros = _engine(processes)
-            ended_early, wall = fly_ros(flight, bag, realtime=realtime, progress=progress)
+            ended_early, wall = fly_ros(
+                flight, bag, namespace=namespace, realtime=realtime, progress=progress
+            )
         else:
             ended_early, wall = fly_library(flight, bag, progress=progress)
     contents = read(bag)
@@ -164,7 +179,9 @@ def _engine(processes: bool) -> Callable[..., tuple[str, float]]:
     return fly_processes if processes else partial(fly_graph, leave=last_of_all)
 
 
-def _dispersion(choice: str | None, seed: int, run: int) -> tuple[dict[str, object], Any]:
+def _dispersion(
+    choice: str | None, seed: int, run: int, namespace: str
+) -> tuple[dict[str, object], Any]:
     """Plant parameters of the option --dispersion, and the Draw that they come from, if any."""
     from ahv_analysis.flight.case import Draw, dispersion_parameters, load_dispersion
     from ahv_plant.dispersion import draw_dispersion
@@ -174,7 +191,7 @@ def _dispersion(choice: str | None, seed: int, run: int) -> tuple[dict[str, obje
     if choice.endswith((".yaml", ".yml")):
         if not Path(choice).is_file():
             raise UsageError(f"dispersion {choice} is not a file")
-        return load_dispersion(Path(choice)), None
+        return load_dispersion(Path(choice), namespace), None
     try:
         level = float(choice)
     except ValueError:

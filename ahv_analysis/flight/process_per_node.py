@@ -23,6 +23,7 @@ from ahv_analysis.flight.shared_memory import pieces, remove_abandoned
 from ahv_analysis.interrupt import SIGNALS, signals_wait
 from ahv_analysis.versions import source_hash
 from ahv_msgs_py.graph import NODES
+from ahv_msgs_py.namespace import ros_arguments
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.deadline import end_with_parent
 from ahv_msgs_py.node.log_folder import log_where_it_can
@@ -31,6 +32,7 @@ from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import Value
+from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.plant_node import PlantNode
 
 SAFE_PATH = "PYTHONSAFEPATH"
@@ -79,6 +81,7 @@ class FlightReport:
 
 def _run_node(
     name: str,
+    namespace: str,
     values: dict[str, Value],
     change: NodeChange | None,
     environment: dict[str, str],
@@ -99,7 +102,7 @@ def _run_node(
         print(f"{name}: the code in {Path(__file__).parents[2]} has changed", file=sys.stderr)
         sys.exit(2)
     os.environ.update(environment)
-    sys.argv = [name]
+    sys.argv = [name, *ros_arguments(namespace)]
     if values[REALTIME.name]:
         take_precedence()  # at once: a node that is started again in flight is missed
     kind = NODES[name].node_class
@@ -138,13 +141,14 @@ class ProcessGraph:
         realtime: bool,
         spectators: int = 0,
         change: NodeChange | None = None,
+        namespace: str = NAMESPACE,
     ):
-        """Prepare the nodes of `case`; nothing runs yet.
+        """Prepare the nodes of `case` in a namespace; nothing runs yet.
 
         `spectators` listen to the state from outside; `change` makes others of the
         classes of the nodes that send in the loop.
         """
-        self._change = change
+        self._change, self._namespace = change, namespace
         self._source = source_hash()
         self.controllers = case.controllers
         listeners = len(self.controllers) + (bag is not None) + spectators
@@ -195,7 +199,15 @@ class ProcessGraph:
         }
         process = self._context.Process(
             target=_run_node,
-            args=(name, self.values[name], self._change, environment, self.report, self._source),
+            args=(
+                name,
+                self._namespace,
+                self.values[name],
+                self._change,
+                environment,
+                self.report,
+                self._source,
+            ),
             name=name,
             daemon=True,
         )
@@ -255,6 +267,7 @@ def fly_processes(
     case: Case,
     bag: Path | None,
     *,
+    namespace: str = NAMESPACE,
     realtime: bool = False,
     progress: Callable[[int], None] = lambda steps: None,
 ) -> tuple[str, float]:
@@ -266,7 +279,7 @@ def fly_processes(
     """
     keep_to_this_machine(shared_memory=not realtime)
     log_where_it_can()
-    graph = ProcessGraph(case, bag, realtime)
+    graph = ProcessGraph(case, bag, realtime, namespace=namespace)
     with signals_wait() as interrupted:
         with graph:
             flown = _watch(graph, realtime, progress, interrupted)
