@@ -19,6 +19,7 @@ from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import STEP_NS
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import kernel
+from ahv_plant.numerics.optional import optional
 from ahv_plant.numerics.simd import LANES, load, store, widen
 from ahv_plant.plant import DRAWN, Hardware, Rig, noise_stream, rig
 from ahv_plant.termination import termination
@@ -64,13 +65,21 @@ def go_on(loop, outcome, first, block, like, truth, control, rig):
     return loop, outcome
 
 
+@optional
+def starting_at(starts, like, rig):
+    """Hardware whose actuators rest where each run has them: `starts` (4, LANES)."""
+    of_all = rig.hardware
+    hardware = Hardware(
+        of_all.actuators, of_all.delay, of_all.jitter, of_all.sensors, load(like, starts)
+    )
+    return Rig(hardware, rig.line)
+
+
 @kernel
 def begin_batch(states, starts, like, control, block, rig, kept):
     """Put loop and outcome of a batch before its flight into `kept`."""
-    every, start = rig.hardware, load(like[2], starts)
-    hardware = Hardware(every.actuators, every.delay, every.jitter, every.sensors, start)
     states, draws = load(like[0], states), load(like[1], block[0])
-    store(kept, begin(states, control, draws, Rig(hardware, rig.line)))
+    store(kept, begin(states, control, draws, starting_at(starts, like[2], rig)))
 
 
 @kernel
@@ -154,8 +163,8 @@ def fly_batch(
     rows = []
     for first in range(0, len(states), LANES):
         batch_outcomes(
-            _lanes(states, first),
-            _lanes(dispersions, first),
+            lanes_of(states, first),
+            lanes_of(dispersions, first),
             LIKE,
             truth,
             control,
@@ -188,7 +197,7 @@ def fly_batch_on_hardware(
     rows = []
     for first in range(0, len(states), LANES):
         streams = noise[first : first + LANES]
-        line = np.array([_lanes(starts, first)] * ROWS)
+        line = np.array([lanes_of(starts, first)] * ROWS)
         equipped = Rig(hardware, line)
 
         def drawn(count: int, streams: Sequence[NoiseStream] = streams) -> Array:
@@ -196,10 +205,10 @@ def fly_batch_on_hardware(
                 stream.fill(block[:count, :, lane])
             return block[:count]
 
-        first_states, controls = _lanes(states, first), _lanes(starts, first)
+        first_states, controls = lanes_of(states, first), lanes_of(starts, first)
         wanted = (LIKE[0], NO_DRAWS, hardware.start)
         begin_batch(first_states, controls, wanted, control, drawn(1), equipped, kept)
-        vehicles = _lanes(dispersions, first)
+        vehicles = lanes_of(dispersions, first)
         for flown in range(0, steps, DRAWN):
             draws = drawn(min(DRAWN, steps - flown))
             go_on_batch(kept, like, vehicles, flown, draws, truth, control, equipped)
@@ -223,7 +232,7 @@ def find_trims(
     trims = np.empty((len(LevelTrim._fields), LANES))
     rows = []
     for first in range(0, len(dispersions), LANES):
-        vehicles = _lanes(dispersions, first)
+        vehicles = lanes_of(dispersions, first)
         trim_batch(vehicles, LIKE, altitude, speed, mass, calm, trims)
         rows.append(trims.T.copy())
     return np.concatenate(rows)[: len(dispersions)]
@@ -243,7 +252,7 @@ def fly_alone(case: Case) -> Outcome:
     return Outcome(*next_outcome(outcome, loop, altitude, truth.geometric))
 
 
-def _lanes(rows: Array, first: int) -> Array:
+def lanes_of(rows: Array, first: int) -> Array:
     """Transpose of LANES rows from `first` on; missing ones repeat the last."""
     index = np.minimum(np.arange(first, first + LANES), len(rows) - 1)
     return np.ascontiguousarray(rows[index].T)

@@ -15,7 +15,13 @@ from typing import Any
 import numpy as np
 
 from ahv_analysis.bag.rows import Array
-from ahv_analysis.campaign.batch import find_trims, fly_alone, fly_batch, fly_batch_on_hardware
+from ahv_analysis.campaign.batch import (
+    find_trims,
+    fly_alone,
+    fly_batch,
+    fly_batch_on_hardware,
+)
+from ahv_analysis.campaign.nose_down import nose_down, nose_down_alphas
 from ahv_analysis.campaign.store import (
     PART_RUNS,
     Columns,
@@ -33,11 +39,12 @@ from ahv_analysis.flight.case import Case, Draw, dispersion_parameters, make_cas
 from ahv_analysis.flight.outcome import Outcome
 from ahv_analysis.versions import what_computes
 from ahv_plant.dispersion import Dispersion, draw_dispersion, in_calm
+from ahv_plant.hardware.noise import NO_DRAWS
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.identity import Definition
-from ahv_plant.plant import noise_stream
+from ahv_plant.plant import noise_stream, rig
 
 RUNS_PER_JOB = 64  # four batches: half a second of work, so that little is lost and little waits
 LOOK = 0.2  # [s] between looks for an interruption
@@ -98,8 +105,7 @@ class Campaign:
             )
             for (name, spread), draw in zip(START_SPREAD.items(), draws.tolist(), strict=True):
                 plant[name] = float(plant[name]) + spread * draw
-        if self.case.plant.hardware is not None:
-            plant |= {"noise.seed": self.seed, "noise.run": run}
+        plant |= {"noise.seed": self.seed, "noise.run": run}
         draw = Draw(self.level, self.seed, run, self.random_starts)
         return make_case(self.case.name, self.case.parameters | {"plant": plant}, draw)
 
@@ -111,6 +117,7 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     states = np.array([campaign.start(run) for run in runs])
     case = campaign.case
     control, (initial, steps, truth, hardware, _) = case.control, case.plant
+    starts = None
     if hardware is None:
         outcomes = fly_batch(states, dispersions, truth, control, steps)
     else:
@@ -126,7 +133,8 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
         initial.mass,
         in_calm(truth),
     )
-    return _columns(np.array(runs), dispersions, states, outcomes, trims)
+    bounds = nose_down_alphas(states, dispersions, starts, truth, hardware)
+    return _columns(np.array(runs), dispersions, states, outcomes, bounds, trims)
 
 
 def fly_again(campaign: Campaign, run: int) -> Columns:
@@ -136,7 +144,10 @@ def fly_again(campaign: Campaign, run: int) -> Columns:
     outcome = fly_alone(case)
     altitude, speed = control.outer.altitude, control.velocity.speed
     trim = level_trim(altitude, speed, initial.mass, in_calm(truth))
-    return _columns(*map(np.array, ([run], [truth.dispersion], [initial], [outcome], [trim])))
+    draws = None if case.plant.hardware is None else NO_DRAWS
+    bound = nose_down(initial, truth, draws, rig(case.plant.hardware))
+    rows = [run], [truth.dispersion], [initial], [outcome], [[bound]], [trim]
+    return _columns(*map(np.array, rows))
 
 
 def fly_job(described: dict[str, Any], first: int, count: int) -> Columns | str:
@@ -162,7 +173,12 @@ def _this_worker() -> str:
 
 
 def _columns(
-    runs: Array, dispersions: Array, states: Array, outcomes: Array, trims: Array
+    runs: Array,
+    dispersions: Array,
+    states: Array,
+    outcomes: Array,
+    bounds: Array,
+    trims: Array,
 ) -> Columns:
     """Columns of the campaign's file."""
     outcome, trim = Outcome(*outcomes.T), LevelTrim(*trims.T)
@@ -187,6 +203,7 @@ def _columns(
         "max_observer_error_dps": outcome.max_observer_error * DEGREES,
         "final_altitude_m": outcome.final_altitude,
         "final_speed_mps": outcome.final_speed,
+        "nose_down_alpha_deg": bounds[:, 0] * DEGREES,
         "trim_exists": trim.exists == 1.0,
         "trim_alpha_deg": trim.alpha * DEGREES,
     }

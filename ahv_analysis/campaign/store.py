@@ -73,6 +73,7 @@ PLAUSIBLE = {
     "max_observer_error_dps": (0.0, inf),
     "final_altitude_m": (0.0, 48500.0),
     "final_speed_mps": (-inf, inf),
+    "nose_down_alpha_deg": (-180.0, 180.0),
     "trim_exists": (False, True),
     "trim_alpha_deg": (-90.0, 90.0),  # where one exists
 }

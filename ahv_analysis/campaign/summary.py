@@ -15,7 +15,7 @@ from ahv_analysis.campaign.store import Columns, level_folder, read_parts
 from ahv_analysis.flight.outcome import Cause
 from ahv_plant.model.constants import DEGREES, UNSTART_ALPHA
 
-COUNTED = ("run", "cause", "time_s", "trim_exists", "trim_alpha_deg")
+COUNTED = ("run", "cause", "time_s", "nose_down_alpha_deg", "trim_exists", "trim_alpha_deg")
 
 
 @dataclass
@@ -25,6 +25,8 @@ class Counts:
     causes: Counter[int] = field(default_factory=Counter)  # by Cause
     holdable: int = 0  # with a trim inside the limits at the commanded altitude
     failed_without_trim: int = 0
+    beyond_saving: int = 0  # pass 5 deg though they go nose down as fast as they can
+    failed_beyond_saving: int = 0
     flown_s: float = 0.0
 
 
@@ -41,6 +43,9 @@ def count_runs(parts: Iterable[Columns], runs: int) -> Counts:
         counts.causes.update(cause.tolist())
         counts.holdable += int(np.sum(holdable))
         counts.failed_without_trim += int(np.sum(~holdable & (cause != Cause.SUCCESS)))
+        beyond = part["nose_down_alpha_deg"][asked] > UNSTART_ALPHA * DEGREES
+        counts.beyond_saving += int(np.sum(beyond))
+        counts.failed_beyond_saving += int(np.sum(beyond & (cause != Cause.SUCCESS)))
         counts.flown_s += float(np.sum(part["time_s"][asked]))
     return counts
 
@@ -52,7 +57,7 @@ def exact_interval(successes: int, runs: int) -> tuple[float, float]:
 
 
 def summarize_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
-    """Counts of a campaign, with the bound that no altitude-holding controller beats."""
+    """Counts of a campaign, with the bounds that no controller beats."""
     parts = read_parts(level_folder(folder, campaign.level), COUNTED, campaign.describe())
     counts = count_runs(parts, campaign.runs)
     runs, successes = counts.causes.total(), counts.causes[Cause.SUCCESS]
@@ -71,5 +76,7 @@ def summarize_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
         "failures": failures,
         "trim_within_5_deg": counts.holdable,
         "failures_without_such_trim": counts.failed_without_trim,
+        "beyond_saving": counts.beyond_saving,
+        "failures_beyond_saving": counts.failed_beyond_saving,
         "flown_s": counts.flown_s,
     }

@@ -16,10 +16,12 @@ from typing import Annotated, Any
 import typer
 
 from ahv_analysis.command.console import (
+    HardwareChoice,
     Json,
     Reported,
     UsageError,
     check_domain,
+    hardware_words,
     integer_option,
     print_json,
     progress_bar,
@@ -84,6 +86,7 @@ def fly(
     random_starts: Annotated[
         bool, typer.Option("--random-starts", help="Section 3.5.2's random starts as well.")
     ] = False,
+    hardware: HardwareChoice = None,
     workers: Workers = CORES,
     dask: Dask = None,
     out: Annotated[
@@ -102,8 +105,8 @@ def fly(
     for one in levels:
         if not 0.0 <= one <= HIGHEST_LEVEL:
             raise UsageError(f"level {one:g} is outside 0 to {HIGHEST_LEVEL:g}")
-    case = load_case(controller + ("_protected" if protected else ""))
-    folder = out or Path("campaigns") / case.name
+    case = load_case(controller + ("_protected" if protected else ""), hardware=hardware)
+    folder = out or Path("campaigns") / "-".join([case.name, *hardware_words(hardware)])
     summaries = []
     with executor_of(workers, dask) as pool:
         for one in levels:
@@ -144,6 +147,11 @@ def _show(summary: dict[str, Any]) -> None:
             "trim within 5 deg",
             f"{summary['trim_within_5_deg']} vehicles have one at the commanded altitude;"
             f" {summary['failures_without_such_trim']} of the failed have none",
+        ),
+        (
+            "beyond saving",
+            f"{summary['beyond_saving']} vehicles pass 5 deg at full nose-down from the start on;"
+            f" {summary['failures_beyond_saving']} of the failed do",
         ),
         ("pace", f"{summary['trial_steps_per_second']:.3g} steps/s, {summary['wall_s']:.1f} s"),
         ("kept in", summary["out"]),
@@ -222,11 +230,10 @@ def table(
     protected: Annotated[
         bool, typer.Option("--protected", help="With angle-of-attack protection.")
     ] = False,
+    hardware: HardwareChoice = None,
     workers: Workers = CORES,
     dask: Dask = None,
-    out: Annotated[Path, typer.Option(help="Folder for campaigns and table.")] = Path(
-        "campaigns/table"
-    ),
+    out: Annotated[Path | None, typer.Option(help="Folder for campaigns and table.")] = None,
     as_json: Json = False,
 ) -> None:
     """Fly Table 5.1 of the report, beside its counts."""
@@ -234,6 +241,8 @@ def table(
 
     started = time.perf_counter()
     total = total_runs(runs)
+    words = hardware_words(hardware)
+    folder = out or Path("campaigns") / "-".join(["table", *words])
     with (
         executor_of(workers, dask) as pool,
         progress_bar("Table 5.1", total, as_json, unit="runs") as progress,
@@ -241,17 +250,21 @@ def table(
         reported = Reported(progress)
         interrupted_says(partial(_kept, reported, total))
         with signals_wait() as interrupted:
-            rows = fly_table(out, pool, seed, runs, protected, reported, interrupted)
+            rows = fly_table(
+                folder, pool, seed, runs, protected, reported, interrupted, hardware=hardware
+            )
     name = "table_protected" if protected else "table"
-    text = markdown(rows)
-    (out / f"{name}.md").write_text(text, encoding="utf-8")
+    title = f"On {words[0]} hardware." if words else "On ideal hardware."
+    text = f"{title}\n\n{markdown(rows)}"
+    (folder / f"{name}.md").write_text(text, encoding="utf-8")
     content = {
+        "hardware": words[0] if words else "ideal",
         "wall_s": time.perf_counter() - started,
         "rows": [row.flown | {"against_report": row.verdict} for row in rows],
     }
-    (out / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    (folder / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
     if as_json:
         print_json(content)
     else:
         print(text)
-        print(f"{total} flights in {content['wall_s']:.0f} s; kept in {out}")
+        print(f"{total} flights in {content['wall_s']:.0f} s; kept in {folder}")

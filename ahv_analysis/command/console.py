@@ -5,6 +5,7 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -37,6 +38,14 @@ class Terminal(Console):
 
 console = Terminal()
 HIGHEST_DOMAIN = 232
+HardwareChoice = Annotated[
+    str | None,
+    typer.Option(
+        "--hardware",
+        metavar="NAME|FILE",
+        help="What the vehicle moves and measures with: ideal, typical, poor, or a YAML file.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
@@ -46,6 +55,11 @@ def number(text: str) -> float:
         return float(text)
     except ValueError:
         raise typer.BadParameter(f"{text!r} is not a number") from None
+
+
+def hardware_words(choice: str | None) -> list[str]:
+    """Name of the hardware that was chosen, for folders and titles; none if it is the case's."""
+    return [] if choice is None else [Path(choice).stem]
 
 
 def number_option(unit: str, meaning: str) -> Any:

@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand
 
 from ahv_analysis.command.console import (
+    HardwareChoice,
     Json,
     Reported,
     UsageError,
@@ -86,6 +87,7 @@ def fly(
             metavar="FILE|LEVEL",
         ),
     ] = None,
+    hardware: HardwareChoice = None,
     seed: Annotated[int, integer_option("Seed of the campaign of a draw.")] = 0,
     run: Annotated[int, integer_option("Number of the run of a draw.")] = 0,
     as_json: Json = False,
@@ -114,7 +116,7 @@ def fly(
     changes, draw = _dispersion(dispersion, seed, run, namespace)
     if duration is not None:
         changes["duration"] = duration
-    flight = load_case(case, changes, draw, namespace)
+    flight = load_case(case, changes, draw, namespace, hardware)
     folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     bag, summary_file = folder / "bag", folder / "summary.json"
     for path in (bag, summary_file):

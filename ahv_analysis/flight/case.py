@@ -19,11 +19,15 @@ from ahv_control.parameters import (
     velocity_loop,
 )
 from ahv_msgs_py.case_file import case_names, case_path, read_case_file
+from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES, case_nodes, controllers
 from ahv_msgs_py.parameters import ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
-from ahv_plant.parameters import PlantSettings, plant_settings
+from ahv_plant.parameters import HARDWARE_PARAMETERS, PlantSettings, plant_settings
+
+HARDWARE = {("plant", parameter.name) for parameter in HARDWARE_PARAMETERS}
+HARDWARE |= {("disturbance_learner", "measured_surfaces")}
 
 TRUE = ("dispersion.", "disturbance.", "wind.", "gust.", "turbulence.")  # of the plant alone
 
@@ -65,11 +69,13 @@ def load_case(
     plant: Mapping[str, object] | None = None,
     draw: Draw | None = None,
     namespace: str = NAMESPACE,
+    hardware: str | None = None,
 ) -> Case:
     """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
 
     `plant` replaces parameters of the plant: a dispersion, another start or duration; `draw` says
     where the dispersion comes from, if it was drawn. The file is read as nodes in `namespace` do.
+    `hardware` is a name of config/hardware, or a file, whose parameters stand above the case's.
     """
     path = Path(name)
     if path.suffix not in (".yaml", ".yml") and name in case_names():
@@ -79,8 +85,39 @@ def load_case(
             f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
         )
     given = read_case_file(path, namespace)
+    if hardware is not None:
+        for node, values in load_hardware(hardware, namespace).items():
+            given[node] |= values
     given["plant"] |= plant or {}
+    if draw is not None:  # the noise is that of the run, as in the campaign
+        given["plant"] |= {"noise.seed": draw.seed, "noise.run": draw.run}
     return make_case(path.stem, given, draw)
+
+
+def hardware_names() -> list[str]:
+    """Hardware that comes with the package."""
+    return sorted(path.stem for path in (config_folder() / "hardware").glob("*.yaml"))
+
+
+def load_hardware(name: str, namespace: str = NAMESPACE) -> dict[str, dict[str, object]]:
+    """Parameters by node of a name in config/hardware, or of a file that says nothing else."""
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml") and name in hardware_names():
+        path = config_folder() / "hardware" / f"{name}.yaml"
+    elif not path.is_file():
+        raise ParameterError(
+            f"hardware {name!r} is neither a YAML file nor one of {', '.join(hardware_names())}"
+        )
+    given = read_case_file(path, namespace)
+    for node, values in given.items():
+        for parameter in values:
+            if (node, parameter) not in HARDWARE:
+                raise ParameterError(
+                    f"{path.name}: {node}: {parameter} has no place in a hardware file; valid are "
+                    "the plant's actuators, latency, failures and sensors, and measured_surfaces "
+                    "of the disturbance_learner"
+                )
+    return given
 
 
 def dispersion_parameters(dispersion: Dispersion) -> dict[str, object]:
