@@ -1,6 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Parameters of the nodes: name, unit, range and meaning, checked alike with and without ROS."""
 
+import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from difflib import get_close_matches
@@ -77,6 +78,11 @@ def meant(name: str, valid: Iterable[str]) -> str:
     return f"did you mean {close[0]!r}? " if close else ""
 
 
+def in_groups(names: Iterable[str]) -> list[str]:
+    """Names as they are listed to people: of those with parts, the first one stands for all."""
+    return list(dict.fromkeys(re.sub(r"\..*", ".*", name) for name in names))
+
+
 def ignored(name: str, valid: Iterable[str]) -> str:
     """Words on a parameter that is given to all nodes, of which none of these is one."""
     return f"there is no parameter {name!r}; {meant(name, valid)}ignored, as it is for all nodes"
@@ -91,7 +97,7 @@ def check_parameters(
         if name not in known:
             raise ParameterError(
                 f"{node}: there is no parameter {excerpt(name)}; "
-                f"{meant(name, known)}valid are {', '.join(known)}"
+                f"{meant(name, known)}valid are {', '.join(in_groups(known))}"
             )
     return {
         name: parameter.check(node, values.get(name, parameter.default))
