@@ -24,9 +24,10 @@ from ahv_msgs_py.graph import NODES, case_nodes, controllers
 from ahv_msgs_py.parameters import ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
+from ahv_plant.hardware.wind_parameters import WIND_PARAMETERS
 from ahv_plant.parameters import HARDWARE_PARAMETERS, PlantSettings, plant_settings
 
-HARDWARE = {("plant", parameter.name) for parameter in HARDWARE_PARAMETERS}
+HARDWARE = {("plant", parameter.name) for parameter in HARDWARE_PARAMETERS + WIND_PARAMETERS}
 HARDWARE |= {("disturbance_learner", "measured_surfaces")}
 
 TRUE = ("dispersion.", "disturbance.", "wind.", "gust.", "turbulence.")  # of the plant alone
@@ -114,8 +115,8 @@ def load_hardware(name: str, namespace: str = NAMESPACE) -> dict[str, dict[str, 
             if (node, parameter) not in HARDWARE:
                 raise ParameterError(
                     f"{path.name}: {node}: {parameter} has no place in a hardware file; valid are "
-                    "the plant's actuators, latency, failures and sensors, and measured_surfaces "
-                    "of the disturbance_learner"
+                    "the plant's actuators, latency, failures, sensors and wind, and "
+                    "measured_surfaces of the disturbance_learner"
                 )
     return given
 
