@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.signal import welch
@@ -16,7 +16,6 @@ from ahv_analysis.flight.case import load_case
 from ahv_plant.dispersion import NOMINAL, FurtherDispersion, Truth, in_calm
 from ahv_plant.hardware.wind import (
     CALM,
-    SCALE,
     Gust,
     SteadyWind,
     TurbulentAir,
@@ -79,6 +78,7 @@ def test_a_vehicle_that_moves_with_the_air_feels_no_wind(state, wind):
 
 
 @unit
+@settings(max_examples=10)
 @given(between(-100.0, 100.0), between(-100.0, 100.0))
 def test_a_flight_in_constant_wind_is_that_in_still_air_seen_from_a_moving_frame(north, east):
     """Galilei: the same air data, attitude and rates; what differs is the way over the ground."""
@@ -142,16 +142,18 @@ def test_a_gust_from_below_raises_the_angle_of_attack_and_the_vehicle():
 
 # Turbulence
 
+LENGTH = 1750.0 * 0.3048  # [m]
+
 
 def along_spectrum(omega, sigma, speed):
     """One-sided spectrum of u [m^2/s^2/(rad/s)] of MIL-F-8785C, in the frequency omega."""
-    per_wave = SCALE / speed
+    per_wave = LENGTH / speed
     return sigma**2 * 2.0 * per_wave / math.pi / (1.0 + (per_wave * omega) ** 2)
 
 
 def across_spectrum(omega, sigma, speed):
     """The same of v and w."""
-    per_wave = SCALE / speed
+    per_wave = LENGTH / speed
     square = (per_wave * omega) ** 2
     return sigma**2 * per_wave / math.pi * (1.0 + 3.0 * square) / (1.0 + square) ** 2
 
