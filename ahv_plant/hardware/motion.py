@@ -112,16 +112,25 @@ def positions(
 
 @elementwise
 def rate_on_actuators(
-    state: State, servos: Servos, told: Controls, time: float, truth: Truth, by: Actuators
+    state: State,
+    servos: Servos,
+    told: Controls,
+    begun: float,
+    time: float,
+    truth: Truth,
+    by: Actuators,
 ) -> State:
-    """Rates of the vehicle's states at `time` [s], with the controls where the servos are."""
-    at = positions(state, servos, told, time, by)
+    """Rates of the vehicle's states at `time` [s], with the controls where the servos are.
+
+    What fails, fails between two steps: it goes by the time when this one has `begun`.
+    """
+    at = positions(state, servos, told, begun, by)
     acting = Surfaces(
-        effect(at.surfaces.right_elevon, time, by.right_elevon),
-        effect(at.surfaces.left_elevon, time, by.left_elevon),
-        effect(at.surfaces.rudder, time, by.rudder),
+        effect(at.surfaces.right_elevon, begun, by.right_elevon),
+        effect(at.surfaces.left_elevon, begun, by.left_elevon),
+        effect(at.surfaces.rudder, begun, by.rudder),
     )
-    return state_rate(state, acting, effect(at.throttle, time, by.throttle), time, truth)
+    return state_rate(state, acting, effect(at.throttle, begun, by.throttle), time, truth)
 
 
 @elementwise
@@ -134,25 +143,25 @@ def step_on_actuators(
     """
     half, middle, end = 0.5 * STEP, time + 0.5 * STEP, time + STEP
     told = told_servos(servos, command, time, by)
-    k1 = rate_on_actuators(state, servos, told, time, truth, by)
+    k1 = rate_on_actuators(state, servos, told, time, time, truth, by)
     r1 = servo_rates(servos, told, time, by)
     at = along_servos(servos, r1, half)
-    k2 = rate_on_actuators(along(state, k1, half), at, told, middle, truth, by)
-    r2 = servo_rates(at, told, middle, by)
+    k2 = rate_on_actuators(along(state, k1, half), at, told, time, middle, truth, by)
+    r2 = servo_rates(at, told, time, by)
     at = along_servos(servos, r2, half)
-    k3 = rate_on_actuators(along(state, k2, half), at, told, middle, truth, by)
-    r3 = servo_rates(at, told, middle, by)
+    k3 = rate_on_actuators(along(state, k2, half), at, told, time, middle, truth, by)
+    r3 = servo_rates(at, told, time, by)
     at = along_servos(servos, r3, STEP)
-    k4 = rate_on_actuators(along(state, k3, STEP), at, told, end, truth, by)
-    r4 = servo_rates(at, told, end, by)
+    k4 = rate_on_actuators(along(state, k3, STEP), at, told, time, end, truth, by)
+    r4 = servo_rates(at, told, time, by)
     ends = along(along(state, k1, STEP / 6.0), k4, STEP / 6.0)
     later = along(along(ends, k2, STEP / 3.0), k3, STEP / 3.0)
-    ends_ = along_servos(along_servos(servos, r1, STEP / 6.0), r4, STEP / 6.0)
-    now = along_servos(along_servos(ends_, r2, STEP / 3.0), r3, STEP / 3.0)
+    outer = along_servos(along_servos(servos, r1, STEP / 6.0), r4, STEP / 6.0)
+    now = along_servos(along_servos(outer, r2, STEP / 3.0), r3, STEP / 3.0)
     servos = Servos(
         settled(now.right_elevon, told.surfaces.right_elevon, by.right_elevon),
         settled(now.left_elevon, told.surfaces.left_elevon, by.left_elevon),
         settled(now.rudder, told.surfaces.rudder, by.rudder),
         settled(now.throttle, told.throttle, by.throttle),
     )
-    return later, servos, positions(later, servos, told, end, by)
+    return later, servos, positions(later, servos, told, time, by)
