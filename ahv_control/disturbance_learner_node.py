@@ -5,7 +5,7 @@ import rclpy
 
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.flight_control import first_learner, next_learner
-from ahv_control.held_inputs import held_rates, held_surfaces, nothing
+from ahv_control.held_inputs import held_positions, held_rates, held_surfaces, nothing
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.parameters import LEARNER_PARAMETERS, learner_settings
 from ahv_msgs_py.node.base_node import BaseNode
@@ -19,6 +19,7 @@ from ahv_msgs_py.topics import (
     RATE_COMMAND,
     STATE,
     SURFACE_COMMAND,
+    SURFACES,
 )
 from ahv_plant.model.constants import DEGREES, STEP_NS
 from ahv_plant.model.vectors import Measurement, Rates, State, Surfaces
@@ -27,9 +28,10 @@ from ahv_plant.model.vectors import Measurement, Rates, State, Surfaces
 class DisturbanceLearnerNode(BaseNode):
     """Answers every state with the disturbance estimate and the state of the learner.
 
-    To learn from state k it needs state k - 1 and the commands that answered that one. In real
-    time it reckons with the commands that the others hold; where the state is missing, the
-    observer starts anew at the new one, and the weights stay.
+    To learn from state k it needs state k - 1 and the commands that answered that one; where
+    surfaces are measured, also their positions at k. In real time it reckons with the commands
+    that the others hold, and with commands where positions stay away; where the state is missing,
+    the observer starts anew at the new one, and the weights stay.
     """
 
     laws = (first_learner, next_learner, disturbance_estimate)
@@ -49,9 +51,11 @@ class DisturbanceLearnerNode(BaseNode):
         self.new_flight()
         self._send_learner = self.sender(LEARNER)
         self._send_estimate = self.sender(DISTURBANCE_ESTIMATE)
-        inputs = ("now", "before", "command", "surfaces")
         fallbacks = {"before": nothing, "command": held_rates, "surfaces": held_surfaces}
-        self._put = self.join(inputs, self._learn, fallbacks, wait=False)
+        if self._law.measured_surfaces:
+            fallbacks["positions"] = held_positions
+            self.receive(SURFACES, self._positions_arrived)
+        self._put = self.join(("now", *fallbacks), self._learn, fallbacks, wait=False)
         self.receive(STATE, self._state_arrived)
         self.receive(RATE_COMMAND, lambda stamp, values: self._put("command", stamp, values))
         self.receive(SURFACE_COMMAND, lambda stamp, values: self._put("surfaces", stamp, values))
@@ -69,6 +73,10 @@ class DisturbanceLearnerNode(BaseNode):
             self._put("now", stamp - STEP_NS, values)
         self._put("before", stamp, values)
 
+    def _positions_arrived(self, stamp: int, values: Values) -> None:
+        """File positions of the surfaces as what moved the vehicle in the step before."""
+        self._put("positions", stamp - STEP_NS, values)
+
     def _learn(
         self,
         stamp: int,
@@ -76,6 +84,7 @@ class DisturbanceLearnerNode(BaseNode):
         before: Values | None,
         command: Values,
         surfaces: Values,
+        positions: Values | None = None,
     ) -> None:
         assert self._learner is not None
         state = State(*now)
@@ -87,7 +96,7 @@ class DisturbanceLearnerNode(BaseNode):
                 State(*before),
                 Surfaces(*surfaces),
                 Rates(*command),
-                Measurement(state, Surfaces(*surfaces)),
+                Measurement(state, Surfaces(*(positions or surfaces))),
                 self._law,
             )
             error = max(

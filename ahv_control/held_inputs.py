@@ -25,6 +25,11 @@ def held_surfaces(last: Values | None, age: int) -> Values:
     return last if age * PERIOD <= HOLD else level_surfaces(Surfaces(*last))
 
 
+def held_positions(last: Values | None, age: int) -> Values | None:
+    """Measured positions [rad]: the last ones for a while, then none, and commands must do."""
+    return last if age * PERIOD <= HOLD else None
+
+
 def held_estimate(last: Values | None, age: int) -> Values:
     """Disturbance estimate: the last one; what the vehicle lacks, it still lacks."""
     return last or (0.0,) * 6

@@ -44,7 +44,7 @@ _NODES = (
         "PlantNode",
         "ahv_plant.parameters.PLANT_PARAMETERS",
         hears=("surface_command", "throttle_command"),
-        sends=("state",),
+        sends=("state", "surfaces", "truth"),  # the last two if its hardware is not ideal
     ),
     GraphNode(
         "outer_intermediate",
@@ -60,7 +60,7 @@ _NODES = (
         "ahv_control.disturbance_learner_node",
         "DisturbanceLearnerNode",
         "ahv_control.parameters.LEARNER_PARAMETERS",
-        hears=("state", "rate_command", "surface_command"),
+        hears=("state", "rate_command", "surface_command", "surfaces"),
         sends=("learner", "disturbance_estimate"),
         controller=True,
         adaptive=True,

@@ -71,7 +71,7 @@ STATE = LoopTopic(
     NamedVector(BODY_FRAME, STATE_NAMES),
     "m/s, m/s, m/s, rad/s, rad/s, rad/s, rad, rad, rad, m, m, m, kg",
     (FINITE,) * 12 + (_MASS,),
-    "vehicle state at 100 Hz",
+    "vehicle state at 100 Hz, as the flight software is told it",
 )
 ATTITUDE_COMMAND = LoopTopic(
     "/ahv/attitude_command",
@@ -118,7 +118,23 @@ LEARNER = LoopTopic(
     "state of the disturbance learner: approximate plant, desired plant, weights of every term",
 )
 LEARNER_TOPICS = (DISTURBANCE_ESTIMATE, LEARNER)
-LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS
+
+SURFACES = LoopTopic(
+    "/ahv/surfaces",
+    NamedVector(BODY_FRAME, SURFACE_NAMES),
+    "rad",
+    (FINITE,) * 3,  # a sensor may show what no surface can do
+    "positions of the surfaces as measured, of flights whose hardware is not ideal",
+)
+TRUTH = LoopTopic(
+    "/ahv/truth",
+    STATE.layout,
+    STATE.units,
+    STATE.bounds,
+    "true state, of flights whose hardware is not ideal; then /ahv/state is as measured",
+)
+HARDWARE_TOPICS = (SURFACES, TRUTH)
+LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS + HARDWARE_TOPICS
 BY_NAME = {relative(topic.name): topic for topic in LOOP_TOPICS}  # as the graph has them
 
 # Not of every step: once a second, and at the end of the flight.

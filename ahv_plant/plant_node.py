@@ -30,6 +30,7 @@ from ahv_msgs_py.topics import (
     FLIGHT,
     FLOWN,
     FLYING,
+    HARDWARE_TOPICS,
     LOOP_TOPICS,
     MARKER,
     ODOMETRY,
@@ -44,11 +45,11 @@ from ahv_msgs_py.topics import (
     ViewerTopic,
 )
 from ahv_plant.model.constants import STEP, STEP_NS
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Controls, Surfaces
 from ahv_plant.parameters import PLANT_PARAMETERS, plant_settings
+from ahv_plant.plant_flight import PlantFlight, warm_up_plant
 from ahv_plant.safe_command import SAFE_THROTTLE, safe_surfaces
 from ahv_plant.termination import termination, termination_reason
-from ahv_plant.vehicle import vehicle_step
 from ahv_plant.viewer_pose import (
     FLU_IN_FRD,
     NED_IN_ENU,
@@ -74,14 +75,14 @@ class Held:
 
 
 class PlantNode(BaseNode):
-    """Publishes state k at stamp k * 10 ms and integrates to k + 1.
+    """Publishes state k at stamp k * 10 ms, as measured, and flies the plant to k + 1.
 
     In lockstep when both commands of k are there; in real time when the 10 ms are over, with the
     newest valid commands. `finished` holds the reason why the flight ended, which is empty when it
     was flown to its end.
     """
 
-    laws = (vehicle_step, termination)
+    laws = (termination,)  # and the plant's own, which depend on what there is of it
 
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
@@ -90,10 +91,12 @@ class PlantNode(BaseNode):
         super().__init__("plant", PLANT_PARAMETERS, values, context)
 
     def prepare(self, settings: dict[str, Value]) -> None:
-        """Set up the vehicle and its flight."""
+        """Set up the vehicle, its hardware and its flight."""
         self.flight = plant_settings(settings)
+        warm_up_plant(self.flight)
+        self._flown = PlantFlight(self.flight)
         self.step = 0
-        self.state = self.flight.initial
+        self.plant = self._flown.start
 
     def start(self) -> None:
         """Open the topics; the flight starts, or goes on, when as many listen as should."""
@@ -101,7 +104,7 @@ class PlantNode(BaseNode):
         self._listeners: dict[bytes, str] = {}  # nodes that hear the state, by their GID
         self._surfaces = Held(SURFACE_COMMAND, (0.0, 0.0, 0.0))
         self._throttle = Held(THROTTLE_COMMAND, (SAFE_THROTTLE,))
-        self._answered_state = self.state  # in real time, the last one
+        self._answered_state = self.plant.measured.state  # in real time, the last one
         self._latencies = array("q")  # [ns] from a state to both its commands
         self._published = 0  # [ns] when the newest state was
         if self.realtime:
@@ -120,6 +123,8 @@ class PlantNode(BaseNode):
         self._transform = self._transform_publisher(TRANSFORM, viewers)
         self._static_transform = self._transform_publisher(STATIC_TRANSFORM, quality(True, 1))
         self._send_flight = self.sender(FLIGHT)
+        if self.flight.hardware is not None:
+            self._send_surfaces, self._send_truth = map(self.sender, HARDWARE_TOPICS)
         self._send_state = self.sender(STATE, self._listeners_changed)
 
     def _transform_publisher(self, topic: ViewerTopic, qos: QoSProfile) -> Any:
@@ -145,7 +150,8 @@ class PlantNode(BaseNode):
         for topic in LOOP_TOPICS:
             name = self.full_name(topic)
             publishers = self.count_publishers(name)
-            if publishers > 1 and topic is not STATE:  # which a plant that was killed may yet have
+            # a plant that was killed may yet have those of its own
+            if publishers > 1 and topic not in (STATE, *HARDWARE_TOPICS):
                 reason = f"{name} has {publishers} publishers: end all but one of them"
                 self._finish(self.step * STEP_NS, ERROR, f"refused to fly: {reason}")
                 return
@@ -179,7 +185,11 @@ class PlantNode(BaseNode):
         if self.realtime:
             self._published = time.monotonic_ns()
         self.health.state_came()
-        self._send_state(stamp, self.state)
+        measured = self.plant.measured
+        if self.flight.hardware is not None:  # first: what is learned is learned at a state
+            self._send_surfaces(stamp, measured.surfaces)
+            self._send_truth(stamp, self.plant.state)
+        self._send_state(stamp, measured.state)
         if self.step % VIEWER_PERIOD == 0:  # while the controllers are at work
             self._publish_for_viewers(stamp)
         if stamp % NANOSECONDS == 0:
@@ -226,9 +236,9 @@ class PlantNode(BaseNode):
         surfaces = self._command(self._surfaces)
         if surfaces is None:
             held = Surfaces(*self._surfaces.values)
-            surfaces = safe_surfaces(held, self._answered_state, self.state)
+            surfaces = safe_surfaces(held, self._answered_state, self.plant.measured.state)
         elif self._surfaces.stamp == self.now:
-            self._answered_state = self.state
+            self._answered_state = self.plant.measured.state
         throttle = self._command(self._throttle) or self._throttle.values
         self._advance(surfaces, throttle)
 
@@ -253,15 +263,14 @@ class PlantNode(BaseNode):
         if self.step == self.flight.steps:
             self._finish(stamp, OK, "")
             return
-        truth = self.flight.truth
-        later = State(
-            *vehicle_step(self.state, Surfaces(*surfaces), throttle[0], self.step * STEP, truth)
-        )
-        reason = termination_reason(later, truth.geometric, (self.step + 1) * STEP)
+        command = Controls(Surfaces(*surfaces), throttle[0])
+        later = self._flown.later(self.plant, command, self.step)
+        geometric = self.flight.truth.geometric
+        reason = termination_reason(later.state, geometric, (self.step + 1) * STEP)
         if reason:
             self._finish(stamp, ERROR, reason)
             return
-        self.state = later
+        self.plant = later
         self.step += 1
         self._publish()
 
@@ -289,7 +298,8 @@ class PlantNode(BaseNode):
 
     def _publish_for_viewers(self, stamp: int) -> None:
         """Send pose and velocity in both conventions; once what does not change."""
-        ned, enu = ned_pose(self.state), enu_pose(self.state)
+        state = self.plant.state
+        ned, enu = ned_pose(state), enu_pose(state)
         self._odometry.publish(_odometry(stamp, ned, EARTH_FRAME, BODY_FRAME))
         self._odometry_enu.publish(_odometry(stamp, enu, *ROBOTICS_FRAMES))
         if self.step == 0:

@@ -34,7 +34,9 @@ from ahv_msgs_py.topics import (
     SETTINGS,
     STATE,
     SURFACE_COMMAND,
+    SURFACES,
     THROTTLE_COMMAND,
+    TRUTH,
     LoopTopic,
     relative,
     within,
@@ -284,9 +286,10 @@ def flight_of(bag: Bag) -> FlightRecord:
         raise BagError(f"{bag.path} holds no step with all of its messages")
     rows = {topic: _at(found, stamps) for topic, found in bag.series.items()}
     estimates = rows.get(DISTURBANCE_ESTIMATE)
+    truth = rows.get(TRUTH)
     return FlightRecord(
         stamps,
-        rows[STATE],
+        rows[STATE] if truth is None else truth,
         rows[ATTITUDE_COMMAND],
         rows[RATE_COMMAND],
         rows[SURFACE_COMMAND],
@@ -295,6 +298,8 @@ def flight_of(bag: Bag) -> FlightRecord:
         rows.get(LEARNER),
         None if estimates is None else part_of(estimates, slice(None), slice(3, None)),
         bag.surfaces_lost_at,
+        None if truth is None else rows[STATE],
+        rows.get(SURFACES),
     )
 
 
@@ -309,7 +314,7 @@ def _required(bag: Bag) -> tuple[LoopTopic, ...]:
     """Topics of the loop that flew: of the learner too, if the notes say so or one is there."""
     adaptive = bag.notes is not None and bag.notes.adaptive
     learned = any(topic in bag.series for topic in LEARNER_TOPICS)
-    return LOOP_TOPICS if adaptive or learned else NOMINAL_TOPICS
+    return NOMINAL_TOPICS + LEARNER_TOPICS if adaptive or learned else NOMINAL_TOPICS
 
 
 def _general(topic: LoopTopic, data: bytes) -> tuple[int, tuple[float, ...]]:

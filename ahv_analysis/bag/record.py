@@ -19,7 +19,7 @@ from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import LEARNER_NAMES
 from ahv_plant.model.aerodynamics import AirData, air_data
 from ahv_plant.model.constants import UNSTART_ALPHA
-from ahv_plant.model.vectors import Rates, State, Surfaces
+from ahv_plant.model.vectors import Measurement, Rates, State, Surfaces
 from ahv_plant.numerics.elementwise import kernel
 
 
@@ -42,15 +42,19 @@ class FlightRecord:
     """N + 1 states and the commands that answer them; those of a long flight are on the disk."""
 
     stamps: NDArray[np.int64]  # (N+1,) [ns]
-    states: Rows  # (N+1, 13) in the order and units of State
+    states: Rows  # (N+1, 13) in the order and units of State: what truly flew
     attitude_commands: Rows  # (N+1, 3) [rad]
     rate_commands: Rows  # (N+1, 3) [rad/s]
-    surfaces: Rows  # (N+1, 3) [rad]
+    surfaces: Rows  # (N+1, 3) [rad] commanded
     throttle: Array  # (N+1,) [-]
     geometric: bool  # h is a geometric altitude
     learner: Rows | None = None  # (N+1, 39) X_a, X_d [rad/s] and weights, of an adaptive flight
     estimates: Rows | None = None  # (N+1, 3) d-hat [rad/s^2], of an adaptive flight
     surfaces_lost_at: int | None = None  # [ns] when the surfaces first could not turn the vehicle
+    measured: Rows | None = None  # (N+1, 13) states as the flight software was told, None if truly
+    positions: Rows | None = (
+        None  # (N+1, 3) [rad] of the surfaces as measured, None if as commanded
+    )
 
     @property
     def steps(self) -> int:
@@ -77,6 +81,8 @@ class FlightRecord:
                 None if self.learner is None else self.learner[part],
                 None if self.estimates is None else self.estimates[part],
                 self.surfaces_lost_at,
+                None if self.measured is None else self.measured[part],
+                None if self.positions is None else self.positions[part],
             )
 
     def column(self, name: str) -> Array:
@@ -107,20 +113,27 @@ class FlightRecord:
 
     @property
     def observer_error(self) -> Array | None:
-        """X - X_a (N+1, 3) [rad/s], the error of eq 4.9; None without a learner."""
-        return None if self.learner is None else self.states[:, 3:6] - self.learner[:, :3]
+        """X - X_a (N+1, 3) [rad/s], the error of eq 4.9; None without a learner.
+
+        X is what the learner was told.
+        """
+        told = self.states if self.measured is None else self.measured
+        return None if self.learner is None else told[:, 3:6] - self.learner[:, :3]
 
     @cached_property
     def actual_disturbance(self) -> Array:
         """What the nominal model misses of the angular acceleration (N, 3) [rad/s^2], eq 4.2.
 
         Of each step: the mean acceleration, (X_k+1 - X_k) / h, less the nominal f(X_k, U_k). That
-        is what the learner has to learn.
+        is what the learner has to learn. U_k are the surfaces as measured at the end of the step
+        where they are, so that an actuator's lag is no disturbance of the vehicle.
         """
+        acting, late = (self.surfaces, 0) if self.positions is None else (self.positions, 1)
         mean = np.diff(self.states[:, 3:6], axis=0) / np.diff(self.time)[:, None]
         for start in range(0, self.steps, BLOCK):
             part = slice(start, start + BLOCK)
-            flown = zip(self.states[part].tolist(), self.surfaces[part].tolist(), strict=True)
+            moved = acting[start + late : start + late + BLOCK].tolist()
+            flown = zip(self.states[part].tolist(), moved, strict=False)
             for rate, (state, surfaces) in zip(mean[part], flown, strict=False):
                 rate -= nominal_response(State(*state), Surfaces(*surfaces), self.geometric)
         return mean
@@ -148,18 +161,31 @@ class Step(NamedTuple):
     """One step of a flight: the state and what the flight control answers."""
 
     stamp: int  # [ns]
-    state: State
+    state: State  # true
     commands: Commands
     learner: LearnerState | None
     ended_early: str  # why this is the last step before its time; empty if it is not
+    measured: Measurement | None  # None with ideal hardware: the state, and surfaces as commanded
+
+    @property
+    def told(self) -> State:
+        """State as the flight software is told it."""
+        return self.state if self.measured is None else self.measured.state
+
+    @property
+    def estimate(self) -> Rates:
+        """Disturbance [rad/s^2] as it has been learned; only with a learner."""
+        assert self.learner is not None
+        return disturbance_estimate(self.learner, Rates(self.told.P, self.told.Q, self.told.R))
 
 
 def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     """Arrays of the steps of a library flight."""
     stamps, throttles = array("q"), array("d")
     states, learners = GrowingRows(len(State._fields)), GrowingRows(len(LEARNER_NAMES))
-    attitudes, rates, surfaces, estimates = (GrowingRows(3) for _ in range(4))
-    adaptive, lost_at = False, None
+    attitudes, rates, surfaces, estimates, positions = (GrowingRows(3) for _ in range(5))
+    measured = GrowingRows(len(State._fields))
+    adaptive, equipped, lost_at = False, False, None
     for step in steps:
         stamps.append(step.stamp)
         if lost_at is None and step.commands.status == SolverStatus.SINGULAR:
@@ -171,9 +197,12 @@ def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
         throttles.append(step.commands.throttle)
         if step.learner is not None:
             adaptive = True
-            body = Rates(step.state.P, step.state.Q, step.state.R)
             learners.append(learner_values(step.learner))
-            estimates.append(disturbance_estimate(step.learner, body))
+            estimates.append(step.estimate)
+        if step.measured is not None:
+            equipped = True
+            measured.append(step.measured.state)
+            positions.append(step.measured.surfaces)
     return FlightRecord(
         np.frombuffer(stamps, np.int64),
         states.rows(),
@@ -185,4 +214,6 @@ def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
         learners.rows() if adaptive else None,
         estimates.rows() if adaptive else None,
         lost_at,
+        measured.rows() if equipped else None,
+        positions.rows() if equipped else None,
     )

@@ -38,7 +38,14 @@ from ahv_analysis.bag.metadata import (
 from ahv_analysis.bag.notes import NOTES
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
-from ahv_msgs_py.topics import FLIGHT, LOOP_TOPICS, QUEUE_DEPTH, VIEWER_TOPICS
+from ahv_msgs_py.topics import (
+    FLIGHT,
+    HARDWARE_TOPICS,
+    LEARNER_TOPICS,
+    NOMINAL_TOPICS,
+    QUEUE_DEPTH,
+    VIEWER_TOPICS,
+)
 
 _FOREVER = QosTime(9223372036, 854775807)  # RMW_DURATION_INFINITE, as rosbag2 writes it
 _QOS = Qos(
@@ -54,6 +61,7 @@ _QOS = Qos(
 )
 ONE_PUBLISHER = 1
 LONGEST = 1000  # messages of a topic in one chunk: what a damaged chunk takes with it
+_HARDWARE = {topic.name: topic.layout.type_name for topic in HARDWARE_TOPICS}
 _Chunk = tuple[bytes, Index]  # message records, and where they are
 _STAMP = np.dtype([("seconds", "<i4"), ("nanoseconds", "<u4")])
 
@@ -101,6 +109,7 @@ class BagWriter:
         self.now = 0  # [ns] latest stamp
         self._inboxes: dict[str, _Inbox] = {}
         self._topics: dict[int, Topic] = {}
+        self._schemas: dict[str, int] = {}  # numbers of the types
         try:
             path.mkdir(parents=True)
             try:
@@ -122,24 +131,29 @@ class BagWriter:
     def _begin(self) -> None:
         """File notes, message definitions and topics, before any message."""
         self._file.add_metadata(metadata_record(self._metadata()))
-        store = get_typestore(Stores.ROS2_JAZZY)
-        topics = [(topic.name, topic.layout.type_name, 4) for topic in (*LOOP_TOPICS, FLIGHT)]
-        topics += [(topic.name, topic.type_name, topic.stamp_offset) for topic in VIEWER_TOPICS]
-        qos = qos_text([_QOS])
-        schemas: dict[str, int] = {}
-        for number, (name, type_name, stamp_offset) in enumerate(topics, 1):
-            if type_name not in schemas:
-                schemas[type_name] = len(schemas) + 1
-                definition, _ = store.generate_msgdef(type_name, ros_version=2)
-                data = definition.encode()
-                self._file.add_schema(Schema(schemas[type_name], data, "ros2msg", type_name))
-            topic = Topic(
-                self._names.get(name, name), type_name, qos, store.hash_rihs01(type_name)
-            )
-            self._file.add_channel(topic.channel(number, schemas[type_name]))
-            self._topics[number] = topic
-            self._inboxes[name] = _Inbox(number, stamp_offset, [], [])
-            self.counts[name] = 0
+        for loop in (*NOMINAL_TOPICS, *LEARNER_TOPICS, FLIGHT):
+            self._room(loop.name, loop.layout.type_name, 4)()
+        for viewer in VIEWER_TOPICS:
+            self._room(viewer.name, viewer.type_name, viewer.stamp_offset)()
+        self.counts |= dict.fromkeys(_HARDWARE, 0)
+
+    def _room(self, name: str, type_name: str, stamp_offset: int | None) -> Callable[[], None]:
+        """Make room for the messages of a topic; what is returned files the topic itself."""
+        known = type_name in self._schemas
+        schema = self._schemas.setdefault(type_name, len(self._schemas) + 1)
+        definition, hashed = _definition(type_name)
+        topic = Topic(self._names.get(name, name), type_name, qos_text([_QOS]), hashed)
+        channel = topic.channel(len(self._topics) + 1, schema)
+        self._topics[channel.id] = topic
+        self._inboxes[name] = _Inbox(channel.id, stamp_offset, [], [])
+        self.counts[name] = 0
+
+        def file() -> None:
+            if not known:
+                self._file.add_schema(Schema(schema, definition, "ros2msg", type_name))
+            self._file.add_channel(channel)
+
+        return file
 
     def write(self, topic: str, *messages: bytes, publishers: Sequence[int] = ()) -> None:
         """File messages of CDR bytes; BagError once the disk has failed.
@@ -149,6 +163,8 @@ class BagWriter:
         """
         if self.failure is not None:
             raise self.failure
+        if topic not in self._inboxes:  # only a flight whose hardware is not ideal has it
+            self._do(self._room(topic, _HARDWARE[topic], 4))
         inbox = self._inboxes[topic]
         inbox.messages.extend(messages)
         inbox.publishers.extend(publishers or [ONE_PUBLISHER] * len(messages))
@@ -245,6 +261,15 @@ class BagWriter:
         stamps = fields["seconds"].astype(np.int64) * NANOSECONDS + fields["nanoseconds"]
         self.now = max(self.now, int(stamps.max()))
         return np.maximum(stamps, 0).astype(np.uint64)
+
+
+@cache
+def _definition(type_name: str) -> tuple[bytes, str]:
+    """Definition of a type of messages, and its hash."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    return store.generate_msgdef(type_name, ros_version=2)[0].encode(), store.hash_rihs01(
+        type_name
+    )
 
 
 def _rows(channel: int, messages: Sequence[bytes], length: int) -> NDArray[np.void]:

@@ -477,7 +477,7 @@ def _judge_bag(bag: Path, injected: list[Injection]) -> dict[str, Any]:
     not_finite: Counter[str] = Counter()
     recorded = load_bag(bag)
     for topic in LOOP_TOPICS:
-        for data in recorded[topic.name].messages:
+        for data in recorded[topic.name].messages if topic.name in recorded else ():
             known = topic.layout.decode(data)
             if known is None or known[0] % STEP_NS:
                 spoilt += topic is STATE

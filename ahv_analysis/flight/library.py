@@ -11,7 +11,6 @@ from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.closed_loop import Loop, loop_step, start_loop
 from ahv_analysis.interrupt import signals_wait
-from ahv_control.disturbance_learner import disturbance_estimate
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.newton_raphson import SolverStatus
 from ahv_msgs_py.layout import clock_bytes
@@ -24,12 +23,13 @@ from ahv_msgs_py.topics import (
     RATE_COMMAND,
     STATE,
     SURFACE_COMMAND,
+    SURFACES,
     THROTTLE_COMMAND,
+    TRUTH,
     LoopTopic,
 )
 from ahv_plant.model.constants import STEP, STEP_NS
-from ahv_plant.model.vectors import Rates
-from ahv_plant.plant import all_draws, rig
+from ahv_plant.plant import Rig, all_draws, rig
 from ahv_plant.termination import termination_reason
 
 CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
@@ -44,15 +44,17 @@ def fly(case: Case) -> Iterator[Step]:
     for number in range(case.plant.steps):
         later = loop_step(loop, number, truth, control, next(draws), equipped)
         reason = termination_reason(later.plant.state, truth.geometric, (number + 1) * STEP)
-        yield _step(number, loop, reason)
+        yield _step(number, loop, reason, equipped)
         if reason:
             return
         loop = later
-    yield _step(case.plant.steps, loop, "")
+    yield _step(case.plant.steps, loop, "", equipped)
 
 
-def _step(number: int, loop: Loop, ended_early: str) -> Step:
-    return Step(number * STEP_NS, loop.plant.state, loop.commands, loop.memory, ended_early)
+def _step(number: int, loop: Loop, ended_early: str, equipped: Rig | None) -> Step:
+    plant = loop.plant
+    measured = None if equipped is None else plant.measured
+    return Step(number * STEP_NS, plant.state, loop.commands, loop.memory, ended_early, measured)
 
 
 def fly_library(
@@ -87,17 +89,17 @@ def write_step(bag: BagWriter, step: Step) -> None:
     answers = step.commands
     bag.write(CLOCK.name, clock_bytes(step.stamp))
     messages: list[tuple[LoopTopic, Sequence[float]]] = [
-        (STATE, step.state),
+        (STATE, step.told),
         (ATTITUDE_COMMAND, answers.attitude),
         (RATE_COMMAND, answers.rates),
         (SURFACE_COMMAND, answers.surfaces),
         (THROTTLE_COMMAND, (answers.throttle,)),
     ]
     if step.learner is not None:
-        rates = Rates(step.state.P, step.state.Q, step.state.R)
-        estimate = disturbance_estimate(step.learner, rates)
         messages.append((LEARNER, learner_values(step.learner)))
-        messages.append((DISTURBANCE_ESTIMATE, estimate_values(estimate)))
+        messages.append((DISTURBANCE_ESTIMATE, estimate_values(step.estimate)))
+    if step.measured is not None:
+        messages += [(SURFACES, step.measured.surfaces), (TRUTH, step.state)]
     for topic, values in messages:
         bag.write(topic.name, topic.layout.encode(step.stamp, values))
     if answers.status == SolverStatus.SINGULAR:

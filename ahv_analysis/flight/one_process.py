@@ -22,7 +22,14 @@ from ahv_msgs_py.node.managed_node import REALTIME
 from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.node.warm_up import warm_up_nodes
-from ahv_msgs_py.topics import LOOP_TOPICS, NAMESPACE, NOMINAL_TOPICS, STATE, LoopTopic
+from ahv_msgs_py.topics import (
+    HARDWARE_TOPICS,
+    LEARNER_TOPICS,
+    NAMESPACE,
+    NOMINAL_TOPICS,
+    STATE,
+    LoopTopic,
+)
 from ahv_plant.plant_node import PlantNode
 
 LONGEST_SILENCE = 10.0  # [s] without a step, after which the graph has failed
@@ -37,7 +44,11 @@ def at_once(leave: Callable[[], None]) -> None:
 
 def loop_topics(case: Case) -> Sequence[LoopTopic]:
     """Topics of the control loop of a case."""
-    return LOOP_TOPICS if case.control.learner else NOMINAL_TOPICS
+    return (
+        *NOMINAL_TOPICS,
+        *(LEARNER_TOPICS if case.control.learner is not None else ()),
+        *(HARDWARE_TOPICS if case.plant.hardware is not None else ()),
+    )
 
 
 def fly_graph(

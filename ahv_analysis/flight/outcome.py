@@ -50,7 +50,10 @@ START = Outcome(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.
 
 @elementwise
 def observer_error(state: State, learner: LearnerState | None) -> float:
-    """Largest |X - X_a| [rad/s] of the three channels; zero without a learner."""
+    """Largest |X - X_a| [rad/s] of the three channels at a `state` as it was told to the learner.
+
+    Zero without one.
+    """
     if learner is None:
         return select(state.P == state.P, 0.0, 0.0)  # as wide as P
     X_a = learner.X_a
@@ -88,7 +91,7 @@ def next_outcome(outcome: Outcome, loop: Loop, altitude: float, geometric: bool)
     `altitude` [m] is h*; `geometric` says which altitude h is.
     """
     state, answer = loop.plant.state, loop.commands
-    observed = observer_error(state, loop.memory)
+    observed = observer_error(loop.plant.measured.state, loop.memory)
     alpha = abs(atan2(state.w, state.u))
     v = abs(state.v)
     beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more

@@ -33,6 +33,7 @@ from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.real_time import take_precedence
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import NAMESPACE
+from ahv_plant.plant_flight import warm_up_plant
 from ahv_plant.plant_node import PlantNode
 
 SAFE_PATH = "PYTHONSAFEPATH"
@@ -149,6 +150,7 @@ class ProcessGraph:
         classes of the nodes that send in the loop.
         """
         self._change, self._namespace = change, namespace
+        warm_up_plant(case.plant)  # whose process then finds its machine code
         self._source = source_hash()
         self.controllers = case.controllers
         listeners = len(self.controllers) + (bag is not None) + spectators

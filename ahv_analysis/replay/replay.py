@@ -52,6 +52,7 @@ from ahv_msgs_py.topics import (
     LEARNER_TOPICS,
     LOOP_TOPICS,
     STATE,
+    SURFACES,
     LoopTopic,
     within,
 )
@@ -256,10 +257,14 @@ class _Graph:
         self._check(name, [*inputs, *answers(name)])
         states = self._stamps(STATE)
         common = states
+        ends = states  # of steps: by what is measured there
         for topic in inputs:
-            common = common_stamps(common, self._stamps(topic))
+            if topic is SURFACES:
+                ends = common_stamps(ends, self._stamps(topic))
+            else:
+                common = common_stamps(common, self._stamps(topic))
         if name == LEARNER_NODE:  # learns from the step before; starts at any state
-            later = np.intersect1d(common + STEP_NS, states, assume_unique=True)
+            later = np.intersect1d(common + STEP_NS, ends, assume_unique=True)
             common = np.union1d(states[:1], later)
         return common
 
