@@ -23,7 +23,9 @@ from ahv_msgs_py.topics import (
     RATE_COMMAND,
     STATE,
     SURFACE_COMMAND,
+    SURFACES,
     THROTTLE_COMMAND,
+    TRUTH,
     LoopTopic,
 )
 from ahv_plant.model.constants import (
@@ -239,6 +241,36 @@ def _observed(index: int, rate: str) -> Quantity:
     )._replace(shown="deg/s", group="Learner", bounds=_observer_bounds)
 
 
+def _measured(true: Quantity) -> Quantity:
+    """A state as the flight software was told it, beside what is true."""
+    drawn = true.plate in ("rates", "attitude")
+    return true._replace(
+        name=f"{true.name}_measured",
+        words=f"measured {true.words}",
+        symbol=f"{true.symbol}_m" if drawn else "",
+        values=_channel(lambda record: record.measured, true.index),
+        plate="measured" if drawn else "",
+        group="Hardware" if drawn else "",
+        reference=lambda record, settings: true.values(record),
+        reference_words="true",
+        band=None,
+    )
+
+
+def _position(commanded: Quantity) -> Quantity:
+    """A surface as it was measured, beside what was commanded."""
+    return commanded._replace(
+        name=f"{commanded.name}_position",
+        words=f"position of the {commanded.words}",
+        topic=SURFACES,
+        values=_channel(lambda record: record.positions, commanded.index),
+        note=commanded.note.replace("commanded", "measured"),
+        plate="surfaces",
+        group="Hardware",
+        reference=lambda record, settings: commanded.values(record),
+    )
+
+
 WEIGHT_UNITS = ("deg/s^2", *(f"deg/s^2/(deg/s)^{n}" for n in (1, 2, 1, 2, 4, 1, 2, 4, 4, 6)))
 QUANTITIES = (
     _velocity("u", "forward speed")._replace(
@@ -355,10 +387,21 @@ QUANTITIES = (
     *(_estimate(index, rate) for index, rate in enumerate("PQR")),
     *(_observed(index, rate) for index, rate in enumerate("PQR")),
 )
+# what flights have whose hardware is not ideal
+QUANTITIES += (
+    *(_position(one) for one in QUANTITIES if one.topic is SURFACE_COMMAND),
+    *(_measured(one) for one in QUANTITIES if one.topic is STATE),
+)
 BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 AXES = (("roll", "P"), ("pitch", "Q"), ("yaw", "R"))
 TRACKED = tuple(quantity for quantity in QUANTITIES if quantity.band is not None)
 CONTROLS = tuple(quantity for quantity in QUANTITIES if quantity.group == "Controls")
+
+
+def source(one: Quantity, record: FlightRecord) -> LoopTopic | None:
+    """Topic that a quantity of a flight is from: of what truly flew the state, if it is told."""
+    true = one.topic is STATE and not one.name.endswith("_measured")
+    return TRUTH if true and record.measured is not None else one.topic
 
 
 def of_group(group: str) -> Sequence[Quantity]:

@@ -19,7 +19,7 @@ from ahv_analysis.bag.notes import Notes
 from ahv_analysis.bag.reader import Bag, flight_of, read
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.bag.rows import GrowingRows, Rows
-from ahv_analysis.quantities import QUANTITIES, Quantity
+from ahv_analysis.quantities import QUANTITIES, Quantity, source
 
 DERIVED = "derived"  # source of a signal that is not recorded
 
@@ -39,7 +39,7 @@ def flight_dataset(record: FlightRecord, notes: Notes | None) -> xarray.Dataset:
     airspeed derived from them. `notes` are those of the bag; they become attributes.
     """
     variables = {
-        one.name: ("time", values, _attributes(one))
+        one.name: ("time", values, _attributes(one, record))
         for one in QUANTITIES
         if (values := one.values(record)) is not None
     }
@@ -52,12 +52,13 @@ def flight_dataset(record: FlightRecord, notes: Notes | None) -> xarray.Dataset:
     return xarray.Dataset(variables, {"time": time}, attributes)
 
 
-def _attributes(one: Quantity) -> dict[str, str]:
+def _attributes(one: Quantity, record: FlightRecord) -> dict[str, str]:
+    topic = source(one, record)
     return {
         "units": one.unit,
         "frame": one.frame,
         "long_name": f"{one.words}, {one.note}" if one.note else one.words,
-        "source": DERIVED if one.topic is None else one.topic.name,
+        "source": DERIVED if topic is None else topic.name,
     }
 
 

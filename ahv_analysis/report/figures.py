@@ -68,6 +68,11 @@ PATH = _subject("Altitude, mass and flight path angle", "path")
 ATTITUDE = _subject("Roll, pitch and yaw angle", "attitude")
 RATES = _subject("Roll, pitch and yaw rate", "rates")
 CONTROLS = _subject("Controls", "controls")
+# Figures of hardware that is not ideal, which the report has none of.
+HARDWARE = (
+    Plate("H.1", *_subject("Surfaces as measured", "surfaces")),
+    Plate("H.2", *_subject("Rates and attitude as measured", "measured")),
+)
 # Figures of a chapter, from its first number on; of single flights, then of campaigns.
 CHAPTER_3 = tuple(
     Plate(f"3.{number}", *subject)
@@ -138,7 +143,7 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
                 commanded = panel.command(record) if label == subject else None
                 if commanded is not None:
                     command = drawn(flown, commanded[:end])
-                    axis.plot(time, command, label="command", **COMMAND_STYLE)
+                    axis.plot(time, command, label=panel.quantity.reference_words, **COMMAND_STYLE)
                     seen.append(command)
             _scale(axis, np.concatenate(seen), panel.bound if len(flights) > 1 else None)
             if panel.bound is not None:

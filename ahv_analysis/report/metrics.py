@@ -16,9 +16,9 @@ from ahv_analysis.bag.rows import Array
 from ahv_analysis.flight.case import Case
 from ahv_analysis.quantities import AXES, CONTROLS, TRACKED, Settings
 from ahv_plant.model.constants import DEGREES, STEP, STEP_NS, UNSTART_ALPHA
-from ahv_plant.model.vectors import State, Surfaces
+from ahv_plant.model.vectors import Controls, State, Surfaces
+from ahv_plant.plant_flight import PlantFlight
 from ahv_plant.termination import termination_reason
-from ahv_plant.vehicle import vehicle_step
 
 # The report bounds alpha alone. Of beta the same flow angle is taken: an assumption, on which no
 # verdict depends.
@@ -179,12 +179,28 @@ def why_ended_early(record: FlightRecord, case: Case) -> str:
     flown = int(record.stamps[-1]) // STEP_NS  # steps, even if the bag lacks some
     if flown >= case.plant.steps:
         return ""
-    truth, end = case.plant.truth, flown * STEP
-    last = State(*record.states[-1].tolist())
-    surfaces = Surfaces(*record.surfaces[-1].tolist())
-    later = State(*vehicle_step(last, surfaces, float(record.throttle[-1]), end, truth))
-    reason = termination_reason(later, truth.geometric, (flown + 1) * STEP)
+    geometric, end = case.plant.truth.geometric, flown * STEP
+    reason = termination_reason(_one_step_later(record, case), geometric, (flown + 1) * STEP)
     return reason or f"the recording stops at {end:g} s of {case.plant.steps * STEP:g} s"
+
+
+def _one_step_later(record: FlightRecord, case: Case) -> State:
+    """The state that the last commands of a record led to.
+
+    What is under way in actuators and sensors is in no record: on hardware the plant is flown
+    again from the start, with all the commands. Where that does not lead to the last state, as in
+    real time, which may have flown others, that state is all that is known.
+    """
+    flight = PlantFlight(case.plant)
+    last = State(*record.states[-1].tolist())
+    ideal = case.plant.hardware is None
+    part = slice(-1 if ideal else 0, None)
+    plant = before = flight.start._replace(state=last) if ideal else flight.start
+    rows = zip(record.stamps[part], record.surfaces[part], record.throttle[part], strict=True)
+    for stamp, surfaces, throttle in rows:
+        command = Controls(Surfaces(*surfaces.tolist()), float(throttle))
+        before, plant = plant, flight.later(plant, command, int(stamp) // STEP_NS)
+    return plant.state if before.state == last else last
 
 
 def measure(record: FlightRecord, settings: Settings) -> dict[str, Any]:

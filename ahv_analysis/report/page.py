@@ -29,7 +29,15 @@ NONE = "–"  # of what does not apply
 
 
 # Headings of the page, in their order.
-GROUPS = ("Path", "Air and mass", "Attitude", "Rates", "Controls", "Learner")
+GROUPS = ("Path", "Air and mass", "Attitude", "Rates", "Controls", "Learner", "Hardware")
+
+SELDOM = (
+    "disturbance.",
+    "actuator.",
+    "failure.",
+    "latency.",
+    "sensor.",
+)  # parameters that are set
 
 
 class Group(NamedTuple):
@@ -216,7 +224,7 @@ def _groups(flights: Sequence[Flight]) -> Iterator[Group]:
 
 
 def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
-    """Parameters of the nodes that flew; of disturbances those that were set."""
+    """Parameters of the nodes that flew; of disturbances and hardware those that were set."""
     cases = [flight.case for flight in flights if flight.case]
     for node in case_nodes():
         flown = any(node in ("plant", *case.controllers) for case in cases)
@@ -226,7 +234,7 @@ def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
                 for flight in flights
             ]
             usual = set(values) <= {parameter.default, None}
-            if not (usual and parameter.name.startswith("disturbance.")):
+            if not (usual and parameter.name.startswith(SELDOM)):
                 yield Setting(
                     node, parameter.name, parameter.unit, parameter.description, values, usual
                 )

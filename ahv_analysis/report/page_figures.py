@@ -23,6 +23,7 @@ from ahv_analysis.report.figures import (
     CHAPTER_4,
     CHAPTER_5,
     FLOWN,
+    HARDWARE,
     NOMINAL,
     Plate,
     draw,
@@ -48,13 +49,14 @@ def flight_figures(
     For an adaptive flight the nominal law is flown from the same start, on the nominal vehicle and
     on the actual one, with the parameters of its case.
     """
+    own = () if flown.positions is None else HARDWARE
     if case is None or flown.learner is None:
-        return CHAPTER_3, partial(draw, flights={FLOWN: flown})
+        return CHAPTER_3 + own, partial(draw, flights={FLOWN: flown})
     nominal = case._replace(control=case.control._replace(learner=None))
     ideal = nominal._replace(plant=case.plant._replace(truth=Truth(case.plant.truth.geometric)))
     plates = CHAPTER_4 if case.control.inner.tracking.exponent == 1.0 else CHAPTER_5
     flights = {NOMINAL: _fly(ideal), ACTUAL: _fly(nominal), ADAPTIVE: flown}
-    return plates, partial(draw, flights=flights)
+    return plates + own, partial(draw, flights=flights)
 
 
 def _fly(case: Case) -> FlightRecord:
