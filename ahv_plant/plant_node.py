@@ -94,9 +94,9 @@ class PlantNode(BaseNode):
         """Set up the vehicle, its hardware and its flight."""
         self.flight = plant_settings(settings)
         warm_up_plant(self.flight)
-        self._flown = PlantFlight(self.flight)
+        self.flown = PlantFlight(self.flight)
         self.step = 0
-        self.plant = self._flown.start
+        self.plant = self.flown.start
 
     def start(self) -> None:
         """Open the topics; the flight starts, or goes on, when as many listen as should."""
@@ -264,7 +264,7 @@ class PlantNode(BaseNode):
             self._finish(stamp, OK, "")
             return
         command = Controls(Surfaces(*surfaces), throttle[0])
-        later = self._flown.later(self.plant, command, self.step)
+        later = self.flown.later(self.plant, command, self.step)
         geometric = self.flight.truth.geometric
         reason = termination_reason(later.state, geometric, (self.step + 1) * STEP)
         if reason:

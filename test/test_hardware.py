@@ -5,6 +5,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
+import rclpy
 from matplotlib import pyplot
 
 from ahv_analysis.bag.dataset import flight_dataset
@@ -23,6 +24,8 @@ from ahv_analysis.report.page_figures import bag_figures
 from ahv_control.held_inputs import held_positions
 from ahv_msgs_py.node.faults import HOLD, PERIOD
 from ahv_msgs_py.topics import HARDWARE_TOPICS, LOOP_TOPICS
+from ahv_plant.model.vectors import Controls, Surfaces
+from ahv_plant.plant_node import PlantNode
 
 SEED = 11
 TYPICAL = {
@@ -146,6 +149,25 @@ def test_the_learner_hears_measured_surfaces_where_it_should(case, bags, measure
     other = make_case("other", given | {"disturbance_learner": learner})
     flown = replay(read_recording(bags / "graph"), other, ["disturbance_learner"])
     assert bool(total(flown.comparisons)["differences"]) is not measured
+
+
+def test_a_plant_that_is_configured_again_has_its_draws_and_its_delay_again(case):
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = PlantNode(of_one(case).parameters["plant"], context)
+    command = Controls(Surfaces(0.1, 0.1, 0.0), 0.5)
+    flights = []
+    for _ in range(2):
+        node.trigger_configure()
+        plants = [node.plant]
+        for number in range(20):
+            plants.append(node.flown.later(plants[-1], command, number))
+        flights.append(plants)
+        node.trigger_cleanup()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+    assert flights[0] == flights[1]
+    assert len({plant.measured.state.Q for plant in flights[0]}) == 21
 
 
 def test_a_measurement_that_stays_away_gives_way_to_the_command():
