@@ -88,7 +88,8 @@ LEARNER_PARAMETERS = (
     Parameter(
         "measured_surfaces",
         False,
-        "the observer of eq 4.3 hears the surfaces as measured; if false, as commanded",
+        "the observer of eq 4.3 hears the surfaces as measured, which takes a plant of hardware "
+        "that is not ideal; if false, as commanded",
     ),
     GEOMETRIC_ALTITUDE,
 )

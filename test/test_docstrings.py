@@ -32,6 +32,7 @@ OWN |= {
     "ahv_control.held_inputs",
     "ahv_plant.parameters",
     "ahv_plant.plant",
+    "ahv_plant.plant_flight",
     "ahv_plant.hardware.actuator_parameters",
     "ahv_plant.hardware.actuators",
     "ahv_plant.hardware.delay",

@@ -141,6 +141,15 @@ def test_an_ideal_flight_has_no_topic_of_hardware(tmp_path):
         assert flown.measured is flown.positions is None
 
 
+def test_ideal_surfaces_are_measured_by_nobody():
+    """A graph would wait for the measurement for ever; the command is the same."""
+    given = load_case("neuro_adaptive_di", {"duration": 0.2}).parameters
+    learner = given["disturbance_learner"] | {"measured_surfaces": True}
+    case = make_case("ideal", given | {"disturbance_learner": learner})
+    assert case.control.learner.measured_surfaces is False
+    assert case.parameters == given
+
+
 @pytest.mark.parametrize("measured", [False, True])
 def test_the_learner_hears_measured_surfaces_where_it_should(case, bags, measured):
     """Its answers differ from the recorded ones if it is told something else than in flight."""

@@ -84,7 +84,7 @@ def test_the_graph_that_flies_is_the_one_that_is_drawn(domain):
             seen[topic] = (senders, {end.node_name for end in ends})
 
     try:
-        case = load_case("neuro_adaptive_di", {"duration": 60.0})
+        case = load_case("neuro_adaptive_di", {"duration": 60.0}, hardware="typical")
         fly_graph(case, None, domain=domain, progress=look)
     finally:
         observer.destroy_node()

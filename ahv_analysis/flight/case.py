@@ -147,6 +147,9 @@ def make_case(
         node: check_parameters(f"{name}: {node}", NODES[node].parameters, given.get(node, {}))
         for node in case_nodes()
     }
+    plant = plant_settings(parameters["plant"])
+    if plant.hardware is None:  # surfaces are where they are commanded to be: nobody measures them
+        parameters["disturbance_learner"]["measured_surfaces"] = False
     adaptive = parameters["inner_loop"]["adaptive"]
     control = FlightControl(
         outer_loop(parameters["outer_intermediate"]),
@@ -155,4 +158,4 @@ def make_case(
         velocity_loop(parameters["velocity"]),
         learner_settings(parameters["disturbance_learner"]) if adaptive else None,
     )
-    return Case(name, parameters, plant_settings(parameters["plant"]), control, draw)
+    return Case(name, parameters, plant, control, draw)
