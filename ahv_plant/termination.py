@@ -4,6 +4,7 @@
 from enum import IntEnum
 
 from ahv_plant.model.atmosphere import ALTITUDE_MAXIMUM, ALTITUDE_MINIMUM, geopotential_altitude
+from ahv_plant.model.mass import MASS_MAXIMUM, MASS_MINIMUM
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import elementwise, select
 
@@ -14,6 +15,7 @@ class Termination(IntEnum):
     NONE = 0
     STATE_IS_NOT_FINITE = 1
     LEFT_THE_ATMOSPHERE_MODEL = 2  # above 47 km or below 0
+    LEFT_THE_MASS_MODEL = 3  # below 60 t: there is no fuel left to burn
 
 
 @elementwise
@@ -24,7 +26,8 @@ def termination(state: State, geometric: bool) -> int:
     total = total + state.phi + state.theta + state.psi + state.x + state.y + H + state.mass
     finite = total - total == 0.0
     inside = (H >= ALTITUDE_MINIMUM) & (H <= ALTITUDE_MAXIMUM)
-    return select(finite, select(inside, 0, 2), 1)
+    weighs = (state.mass >= MASS_MINIMUM) & (state.mass <= MASS_MAXIMUM)
+    return select(finite, select(inside, select(weighs, 0, 3), 2), 1)
 
 
 def termination_reason(state: State, geometric: bool, time: float) -> str:

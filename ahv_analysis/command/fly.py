@@ -230,6 +230,8 @@ def _print_summary(summary: dict[str, Any]) -> None:
         ("pace", f"{summary['real_time_factor']:.0f} times real time"),
         ("bag", summary["bag"]),
     ]
+    for what, since in summary["outside_the_model"].items():
+        rows.append(("outside the model", f"{what} from {since:g} s on"))
     if summary["refused"]:
         rows.append(("refused", refused_words(summary["refused"])))
     show_table(f"{summary['case']} on the {summary['engine']}", rows)

@@ -26,6 +26,7 @@ from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
 from ahv_plant.hardware.wind_parameters import WIND_PARAMETERS
 from ahv_plant.parameters import HARDWARE_PARAMETERS, PlantSettings, plant_settings
+from ahv_plant.trim import check_flight_condition
 
 HARDWARE = {("plant", parameter.name) for parameter in HARDWARE_PARAMETERS + WIND_PARAMETERS}
 HARDWARE |= {("disturbance_learner", "measured_surfaces")}
@@ -150,6 +151,7 @@ def make_case(
     plant = plant_settings(parameters["plant"])
     if plant.hardware is None:  # surfaces are where they are commanded to be: nobody measures them
         parameters["disturbance_learner"]["measured_surfaces"] = False
+    _check_commands(parameters, plant)
     adaptive = parameters["inner_loop"]["adaptive"]
     control = FlightControl(
         outer_loop(parameters["outer_intermediate"]),
@@ -159,3 +161,13 @@ def make_case(
         learner_settings(parameters["disturbance_learner"]) if adaptive else None,
     )
     return Case(name, parameters, plant, control, draw)
+
+
+def _check_commands(parameters: Mapping[str, Mapping[str, Value]], plant: PlantSettings) -> None:
+    """ParameterError for an altitude or a speed at which the vehicle model does not hold."""
+    altitude = float(parameters["outer_intermediate"]["altitude"])
+    speed = float(parameters["velocity"]["speed"])
+    try:
+        check_flight_condition(altitude, speed, plant.initial.mass, plant.truth.geometric)
+    except ValueError as error:
+        raise ParameterError(f"outer_intermediate, velocity: commanded {error}") from error

@@ -24,6 +24,7 @@ class Cause(IntEnum):
     LEFT_THE_ATMOSPHERE_MODEL = 2
     SURFACES_LOST_THE_VEHICLE = 3  # the Newton step met a singular Jacobian
     INLET_UNSTART = 4  # |alpha| > 5 deg
+    LEFT_THE_MASS_MODEL = 5  # the fuel is burnt
 
 
 class Outcome(NamedTuple):
@@ -66,7 +67,8 @@ def cause_now(state: State, status: int, geometric: bool) -> float:
     left = termination(state, geometric)
     unstart = select(abs(atan2(state.w, state.u)) > UNSTART_ALPHA, 4.0, 0.0)
     lost = select(status == 3, 3.0, unstart)
-    outside = select(left == 2, 2.0, lost)
+    spent = select(left == 3, 5.0, lost)
+    outside = select(left == 2, 2.0, spent)
     return select(left == 1, 1.0, outside)
 
 

@@ -11,10 +11,14 @@ from ahv_analysis.bag.rows import BLOCK
 from ahv_analysis.flight.outcome import Cause, first_cause
 from ahv_analysis.report.metrics import fuel, margins
 from ahv_msgs_py.topics import STATE
+from ahv_plant.model.aerodynamics import MACH_MINIMUM
 from ahv_plant.model.constants import DEGREES, STEP_NS
 from ahv_plant.model.vectors import State
 from ahv_plant.termination import Termination
+from ahv_plant.trim import MACH_MAXIMUM
 
+OUTSIDE_THE_MODEL = "outside_the_model"  # what would be one, if the vehicle's data held for it
+STEEPEST = 89.0  # [deg] pitch beyond which the Euler angles do not describe the attitude
 NOT_ALL_RECORDED = "not_all_recorded"  # what would be a success, if the record showed all of it
 
 
@@ -38,18 +42,38 @@ def summarize(record: FlightRecord, ended_early: str, missing: int = 0) -> dict[
     cause = failure(record, ended_early).name.lower()
     if cause == Cause.SUCCESS.name.lower() and missing:
         cause = NOT_ALL_RECORDED
+    outside = outside_the_model(record)
+    if cause == Cause.SUCCESS.name.lower() and outside:
+        cause = OUTSIDE_THE_MODEL
     return {
         "steps": record.steps,
         "missing_steps": missing,
         "success": cause == Cause.SUCCESS.name.lower(),
         "cause": cause,
         "ended_early": ended_early,
+        "outside_the_model": outside,
         "max_abs_alpha_deg": angles["alpha"].largest_deg,
         "max_abs_beta_deg": angles["beta"].largest_deg,
         "surface_range_deg": [float(np.min(surfaces)), float(np.max(surfaces))],
         "throttle_range": [float(np.min(record.throttle)), float(np.max(record.throttle))],
         "fuel_kg": fuel(record),
         "final_state": dict(zip(State._fields, record.states[-1].tolist(), strict=True)),
+    }
+
+
+def outside_the_model(record: FlightRecord) -> dict[str, float]:
+    """When [s] a flight first was where the model of the vehicle does not hold, by what it left.
+
+    Atmosphere and mass end a flight; here are the ranges in which it can go on all the same.
+    """
+    mach, pitch = record.air.mach, np.abs(record.column("theta")) * DEGREES
+    left = {
+        f"below Mach {MACH_MINIMUM:g}": mach < MACH_MINIMUM,
+        f"above Mach {MACH_MAXIMUM:g}": mach > MACH_MAXIMUM,
+        f"pitch beyond {STEEPEST:g} deg": pitch > STEEPEST,
+    }
+    return {
+        what: float(record.time[np.argmax(where)]) for what, where in left.items() if where.any()
     }
 
 
