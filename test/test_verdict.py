@@ -79,7 +79,7 @@ def test_graph_and_library_tell_alike_of_surfaces_that_were_lost(tmp_path):
 
 
 def test_another_inner_loop_is_not_judged_by_our_solver(tmp_path):
-    """It had no trouble where ours would lose a vehicle that stands still, and says so by silence."""
+    """It has no trouble where ours would lose a vehicle that stands still: it is silent."""
     case = load_case("nominal_di", SHORT)
     slow = case.plant.initial._replace(u=1.0, w=0.0)
     case = case._replace(plant=case.plant._replace(initial=slow))
