@@ -23,6 +23,7 @@ from ahv_plant.hardware.parameters import (
     SENSOR_PARAMETERS,
     sensor_settings,
 )
+from ahv_plant.hardware.wind import is_turbulent
 from ahv_plant.hardware.wind_parameters import WIND_PARAMETERS, wind_settings
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
@@ -93,7 +94,7 @@ class PlantSettings(NamedTuple):
     initial: State
     steps: int  # number of integration steps of 0.01 s
     truth: Truth
-    hardware: Hardware | None  # None is ideal
+    hardware: Hardware | None  # None is ideal, in air without turbulence
     noise: tuple[int, int]  # seed of the campaign and run, of which its numbers are
 
 
@@ -124,17 +125,19 @@ def plant_settings(values: Mapping[str, Value]) -> PlantSettings:
         raise ParameterError(
             f"plant: duration is {duration!r} s, but must be whole steps of {STEP:g} s"
         )
-    hardware = _hardware(values, initial, geometric)
+    hardware = _hardware(values, initial, truth)
     noise = int(values["noise.seed"]), int(values["noise.run"])
     return PlantSettings(initial, steps, truth, hardware, noise)
 
 
-def _hardware(values: Mapping[str, Value], initial: State, geometric: bool) -> Hardware | None:
-    """Hardware in SI units; None where every part is ideal."""
+def _hardware(values: Mapping[str, Value], initial: State, truth: Truth) -> Hardware | None:
+    """Hardware in SI units; None where every part is ideal and the air is not turbulent."""
     ideal = {parameter.name: parameter.default for parameter in HARDWARE_PARAMETERS}
-    if all(values[name] == ideal[name] for name in ideal if name != "failure.time"):
+    as_ideal = all(values[name] == ideal[name] for name in ideal if name != "failure.time")
+    if as_ideal and not is_turbulent(truth.wind):
         return None
-    trim = LevelTrim(*level_trim(initial.h, initial.u, initial.mass, Truth(geometric)))
+    calm = Truth(truth.geometric)
+    trim = LevelTrim(*level_trim(initial.h, initial.u, initial.mass, calm))
     start = Controls(Surfaces(0.0, 0.0, 0.0), SAFE_THROTTLE)
     if trim.exists:
         start = Controls(Surfaces(trim.elevon, trim.elevon, 0.0), trim.throttle)
@@ -142,7 +145,7 @@ def _hardware(values: Mapping[str, Value], initial: State, geometric: bool) -> H
         actuators(values),
         delay_steps(values),
         float(values["latency.jitter"]),
-        sensor_settings(values),
+        sensor_settings(values, windy=truth.wind is not None),
         start,
     )
 

@@ -12,8 +12,9 @@ class PlantFlight:
     def __init__(self, settings: PlantSettings):
         """Begin at the first state."""
         self._truth, self._rig = settings.truth, rig(settings.hardware)
-        self._draws = all_draws(settings.hardware, *settings.noise)
-        self.start: Plant = start_plant(settings.initial, next(self._draws), self._rig)
+        self._draws = all_draws(settings.hardware, self._truth.wind, *settings.noise)
+        draws = next(self._draws)
+        self.start: Plant = start_plant(settings.initial, self._truth, draws, self._rig)
 
     def later(self, plant: Plant, command: Controls, number: int) -> Plant:
         """The plant 0.01 s later; `number` counts the steps flown before."""

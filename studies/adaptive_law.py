@@ -89,7 +89,7 @@ def fly_study(
     state: State, settings: FlightControl, truth: Truth, explicit: bool, steps: int
 ) -> tuple[int, float, float, float]:
     """Fly until the end or the loss of the vehicle; sums for `Score`."""
-    loop = start_loop(state, settings, None, None)
+    loop = start_loop(state, truth, settings, None, None)
     largest, follow, rough = 0.0, 0.0, 0.0
     for number in range(steps):
         state, before = loop.plant.state, loop.commands.surfaces

@@ -69,7 +69,7 @@ def number(value):
 
 case = load_case("neuro_adaptive_sc_gdi")
 state, truth, control = number(case.plant.initial), number(case.plant.truth), number(case.control)
-loop = start_loop(state, control, None, None)
+loop = start_loop(state, truth, control, None, None)
 counts.update(dict.fromkeys(counts, 0))
 loop_step(loop, 0, truth, control, None, None)
 print(json.dumps(counts))

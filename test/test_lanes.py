@@ -37,7 +37,7 @@ SEED = 5
 def last_of_flight(state, truth, control, steps):
     """State and learner at the end of an adaptive flight; the numbers may be lanes."""
     one = state.u
-    loop = widen(start_loop(state, control, None, None), one)
+    loop = widen(start_loop(state, truth, control, None, None), one)
     for number in range(steps):
         loop = widen(loop_step(loop, number, truth, control, None, None), one)
     return loop.plant.state, loop.memory

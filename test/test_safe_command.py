@@ -24,7 +24,7 @@ def largest_alpha(run, fall_back):
     changes = dispersion_parameters(draw_dispersion(0.3, 11, run))
     case = load_case("neuro_adaptive_sc_gdi", changes)
     truth = case.plant.truth
-    loop = start_loop(case.plant.initial, case.control, None, None)
+    loop = start_loop(case.plant.initial, truth, case.control, None, None)
     for number in range(CALM):
         loop = loop_step(loop, number, truth, case.control, None, None)
     held, throttle = loop.commands.surfaces, loop.commands.throttle

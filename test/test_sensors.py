@@ -106,10 +106,10 @@ def test_a_perfect_sensor_tells_the_value_itself_to_the_last_bit(value):
 
 def test_perfect_sensors_tell_the_state_and_the_surfaces_to_the_last_bit():
     normals = Noise(State(*[1.5] * 13), Surfaces(-1.5, 2.0, 0.5), AirVelocity(1.0, -1.0, 0.3))
-    memory, first = first_measurement(STATE, SURFACES, normals, sensors_of())
+    memory, first = first_measurement(STATE, STATE, SURFACES, normals, sensors_of())
     assert same_bits(first, (STATE, SURFACES))
     later = STATE._replace(u=1800.0, h=-0.0)
-    _, told = measure(memory, later, Surfaces(-0.0, 0.1, 0.2), normals, sensors_of())
+    _, told = measure(memory, later, later, Surfaces(-0.0, 0.1, 0.2), normals, sensors_of())
     assert same_bits(told, (later, Surfaces(-0.0, 0.1, 0.2)))
 
 
@@ -117,7 +117,7 @@ def test_perfect_sensors_tell_the_state_and_the_surfaces_to_the_last_bit():
 def test_the_error_of_one_channel_touches_no_other(name):
     sensors = sensors_of(**{name: Sensor(noise=0.5, bias=2.0)})
     normals = Noise(State(*[1.0] * 13), Surfaces(1.0, 1.0, 1.0), QUIET.air)
-    _, (state, surfaces) = first_measurement(STATE, SURFACES, normals, sensors)
+    _, (state, surfaces) = first_measurement(STATE, STATE, SURFACES, normals, sensors)
     told, true = (a._asdict() | b._asdict() for a, b in ((state, surfaces), (STATE, SURFACES)))
     assert told.pop(name) == true.pop(name) + 2.5
     assert same_bits(tuple(told.values()), tuple(true.values()))
@@ -157,19 +157,23 @@ def test_the_error_of_quantisation_is_uniform_over_a_quantum():
 def test_a_lag_answers_a_step_by_its_closed_form(time_constant):
     """After k samples of a held input of 1 the reading is 1 - exp(-k STEP / tau)."""
     sensors = sensors_of(h=Sensor(lag=lag(time_constant)))
-    memory, told = first_measurement(STATE._replace(h=0.0), SURFACES, QUIET, sensors)
+    memory, told = first_measurement(
+        STATE._replace(h=0.0), STATE._replace(h=0.0), SURFACES, QUIET, sensors
+    )
     assert told.state.h == 0.0
     for samples in range(1, 200):
-        memory, told = measure(memory, STATE._replace(h=1.0), SURFACES, QUIET, sensors)
+        memory, told = measure(
+            memory, STATE._replace(h=1.0), STATE._replace(h=1.0), SURFACES, QUIET, sensors
+        )
         exact = -math.expm1(-samples * STEP / time_constant)
         assert told.state.h == pytest.approx(exact, rel=1e-11), samples
 
 
 def test_a_lag_has_settled_when_the_flight_starts():
     sensors = drawn_sensors(0)
-    memory, first = first_measurement(STATE, SURFACES, QUIET, sensors)
+    memory, first = first_measurement(STATE, STATE, SURFACES, QUIET, sensors)
     for _ in range(3):
-        memory, told = measure(memory, STATE, SURFACES, QUIET, sensors)
+        memory, told = measure(memory, STATE, STATE, SURFACES, QUIET, sensors)
         assert told == first
 
 
@@ -177,9 +181,11 @@ def test_what_follows_the_lag_is_not_lagged():
     """A bias stands in full in the first reading after any step, and so does noise."""
     sensors = sensors_of(h=Sensor(noise=2.0, bias=10.0, lag=0.5))
     start = STATE._replace(h=0.0)
-    memory, _ = first_measurement(start, SURFACES, QUIET, sensors)
+    memory, _ = first_measurement(start, start, SURFACES, QUIET, sensors)
     normals = QUIET._replace(state=QUIET.state._replace(h=1.5))
-    _, told = measure(memory, STATE._replace(h=8.0), SURFACES, normals, sensors)
+    _, told = measure(
+        memory, STATE._replace(h=8.0), STATE._replace(h=8.0), SURFACES, normals, sensors
+    )
     assert told.state.h == 4.0 + 10.0 + 3.0
 
 
@@ -190,7 +196,7 @@ def test_what_follows_the_lag_is_not_lagged():
 def test_perfect_air_data_rebuild_the_velocity(u, v, w):
     state = STATE._replace(u=u, v=v, w=w)
     sensors = sensors_of(alpha=PERFECT)
-    _, (told, _) = first_measurement(state, SURFACES, QUIET, sensors)
+    _, (told, _) = first_measurement(state, state, SURFACES, QUIET, sensors)
     speed = math.hypot(u, v, w)
     assert told[:3] == pytest.approx((u, v, w), rel=1e-12, abs=1e-12 * speed)
     assert same_bits(told[3:], state[3:])
@@ -200,7 +206,7 @@ def test_an_error_of_air_data_is_one_of_the_angles_and_the_speed_of_what_is_told
     state = STATE._replace(u=1800.0, v=30.0, w=90.0)
     off = {"alpha": 0.02, "beta": -0.01, "speed": 25.0}
     sensors = sensors_of(**{name: Sensor(bias=bias) for name, bias in off.items()})
-    u, v, w = first_measurement(state, SURFACES, QUIET, sensors)[1].state[:3]
+    u, v, w = first_measurement(state, state, SURFACES, QUIET, sensors)[1].state[:3]
     speed, true_speed = math.hypot(u, v, w), math.hypot(1800.0, 30.0, 90.0)
     assert math.atan2(w, u) == pytest.approx(math.atan2(90.0, 1800.0) + 0.02, abs=1e-12)
     assert math.asin(v / speed) == pytest.approx(math.asin(30.0 / true_speed) - 0.01, abs=1e-12)
@@ -211,7 +217,7 @@ def test_beside_air_data_the_sensors_of_u_v_w_have_no_say():
     loud = Sensor(noise=50.0, bias=100.0)
     normals = Noise(State(*[1.0] * 13), Surfaces(1.0, 1.0, 1.0), AirVelocity(1.0, 1.0, 1.0))
     with_them, without = (
-        first_measurement(STATE, SURFACES, normals, sensors)[1]
+        first_measurement(STATE, STATE, SURFACES, normals, sensors)[1]
         for sensors in (
             sensors_of(u=loud, v=loud, w=loud, beta=PERFECT),
             sensors_of(beta=PERFECT),
@@ -229,11 +235,13 @@ def test_beside_air_data_the_sensors_of_u_v_w_have_no_say():
 def tell_alone(truths, block, sensors, told):
     """Measurements (steps, 16) of true values and draws, both (steps, channels)."""
     true = draws_of(truths[0]).noise
-    memory, now = first_measurement(true.state, true.surfaces, draws_of(block[0]).noise, sensors)
+    memory, now = first_measurement(
+        true.state, true.state, true.surfaces, draws_of(block[0]).noise, sensors
+    )
     for step in range(len(truths)):
         if step > 0:
             true, noise = draws_of(truths[step]).noise, draws_of(block[step]).noise
-            memory, now = measure(memory, true.state, true.surfaces, noise, sensors)
+            memory, now = measure(memory, true.state, true.state, true.surfaces, noise, sensors)
         for i, value in enumerate(now.state):
             told[step, i] = value
         for i, value in enumerate(now.surfaces):
@@ -244,11 +252,13 @@ def tell_alone(truths, block, sensors, told):
 def tell_lanes(like, truths, block, sensors, told):
     """The same with a last axis of LANES runs."""
     true = load(like, truths[0]).noise
-    memory, now = first_measurement(true.state, true.surfaces, load(like, block[0]).noise, sensors)
+    memory, now = first_measurement(
+        true.state, true.state, true.surfaces, load(like, block[0]).noise, sensors
+    )
     store(told[0], now)
     for step in range(1, len(truths)):
         true, noise = load(like, truths[step]).noise, load(like, block[step]).noise
-        memory, now = measure(memory, true.state, true.surfaces, noise, sensors)
+        memory, now = measure(memory, true.state, true.state, true.surfaces, noise, sensors)
         store(told[step], now)
 
 

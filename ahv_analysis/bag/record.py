@@ -92,7 +92,7 @@ class FlightRecord:
 
     @cached_property
     def air(self) -> Air:
-        """Air data, every field an array (N+1,)."""
+        """Air data, every field an array (N+1,), as in still air: states do not tell the wind."""
         growing = GrowingRows(len(AirData._fields))
         for start in range(0, len(self.states), BLOCK):
             states = np.ascontiguousarray(self.states[start : start + BLOCK])

@@ -32,11 +32,11 @@ LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 def run_outcome(state, truth, control, steps):
     """Outcome of a flight; the numbers may be lanes."""
     one, altitude = state.u, control.outer.altitude
-    loop, outcome = widen(start_loop(state, control, None, None), one), widen(START, one)
+    loop, outcome = widen(start_loop(state, truth, control, None, None), one), widen(START, one)
     for number in range(steps):
-        outcome = next_outcome(outcome, loop, altitude, truth.geometric)
+        outcome = next_outcome(outcome, loop, number, altitude, truth)
         loop = widen(loop_step(loop, number, truth, control, None, None), one)
-    return next_outcome(outcome, loop, altitude, truth.geometric)
+    return next_outcome(outcome, loop, steps, altitude, truth)
 
 
 @kernel
@@ -48,9 +48,9 @@ def batch_outcomes(states, dispersions, like, truth, control, steps, result):
 
 
 @kernel
-def begin(state, control, draws, rig):
+def begin(state, truth, control, draws, rig):
     """Loop and outcome before a flight on hardware; the numbers may be lanes."""
-    loop = start_loop(state, control, draws, rig)
+    loop = start_loop(state, truth, control, draws, rig)
     return widen(loop, state.u), widen(START, state.u)
 
 
@@ -59,7 +59,7 @@ def go_on(loop, outcome, first, block, like, truth, control, rig):
     """Loop and outcome after as many steps as there are rows of draws in a block."""
     one, altitude = loop.plant.state.u, control.outer.altitude
     for row in range(len(block)):
-        outcome = next_outcome(outcome, loop, altitude, truth.geometric)
+        outcome = next_outcome(outcome, loop, first + row, altitude, truth)
         draws = load(like, block[row])
         loop = widen(loop_step(loop, first + row, truth, control, draws, rig), one)
     return loop, outcome
@@ -76,10 +76,10 @@ def starting_at(starts, like, rig):
 
 
 @kernel
-def begin_batch(states, starts, like, control, block, rig, kept):
+def begin_batch(states, starts, like, truth, control, block, rig, kept):
     """Put loop and outcome of a batch before its flight into `kept`."""
     states, draws = load(like[0], states), load(like[1], block[0])
-    store(kept, begin(states, control, draws, starting_at(starts, like[2], rig)))
+    store(kept, begin(states, truth, control, draws, starting_at(starts, like[2], rig)))
 
 
 @kernel
@@ -93,10 +93,10 @@ def go_on_batch(kept, like, dispersions, first, block, truth, control, rig):
 
 
 @kernel
-def end_batch(kept, like, altitude, geometric, result):
+def end_batch(kept, like, steps, altitude, truth, result):
     """Outcomes of a batch at the end of its flight."""
     loop, outcome = load(like, kept)
-    store(result, next_outcome(outcome, loop, altitude, geometric))
+    store(result, next_outcome(outcome, loop, steps, altitude, truth))
 
 
 @kernel
@@ -109,7 +109,7 @@ def trim_batch(dispersions, like, altitude, speed, mass, calm, result):
 @kernel
 def run_trajectory(state, truth, control, steps, every, states, commands):
     """Fly one run; keep every so many states (13) and commands (10)."""
-    loop = start_loop(state, control, None, None)
+    loop = start_loop(state, truth, control, None, None)
     for number in range(steps + 1):
         if number % every == 0:
             _keep(number // every, loop.plant.state, loop.commands, states, commands)
@@ -190,7 +190,7 @@ def fly_batch_on_hardware(
     The actuators rest at `starts` (N, 4), in the order of `Controls`, until they are told.
     """
     outcomes = np.empty((len(Outcome._fields), LANES))
-    sample = begin(State(*states[0]), control, NO_DRAWS, rig(hardware))
+    sample = begin(State(*states[0]), truth, control, NO_DRAWS, rig(hardware))
     kept = np.empty((_count(sample), LANES))
     like = (Dispersion(), NO_DRAWS, sample)
     block = np.zeros((DRAWN, len(Channel), LANES))
@@ -207,12 +207,12 @@ def fly_batch_on_hardware(
 
         first_states, controls = lanes_of(states, first), lanes_of(starts, first)
         wanted = (LIKE[0], NO_DRAWS, hardware.start)
-        begin_batch(first_states, controls, wanted, control, drawn(1), equipped, kept)
+        begin_batch(first_states, controls, wanted, truth, control, drawn(1), equipped, kept)
         vehicles = lanes_of(dispersions, first)
         for flown in range(0, steps, DRAWN):
             draws = drawn(min(DRAWN, steps - flown))
             go_on_batch(kept, like, vehicles, flown, draws, truth, control, equipped)
-        end_batch(kept, sample, control.outer.altitude, truth.geometric, outcomes)
+        end_batch(kept, sample, steps, control.outer.altitude, truth, outcomes)
         rows.append(outcomes.T.copy())
     return np.concatenate(rows)[: len(states)]
 
@@ -243,13 +243,13 @@ def fly_alone(case: Case) -> Outcome:
     state, steps, truth, hardware, noise = case.plant
     if hardware is None:
         return Outcome(*run_outcome(state, truth, case.control, steps))
-    equipped, stream = rig(hardware), noise_stream(hardware, *noise)
-    loop, outcome = begin(state, case.control, draws_of(stream.block(1)[0]), equipped)
+    equipped, stream = rig(hardware), noise_stream(hardware, truth.wind, *noise)
+    loop, outcome = begin(state, truth, case.control, draws_of(stream.block(1)[0]), equipped)
     for flown in range(0, steps, DRAWN):
         block = stream.block(min(DRAWN, steps - flown))
         loop, outcome = go_on(loop, outcome, flown, block, NO_DRAWS, truth, case.control, equipped)
     altitude = case.control.outer.altitude
-    return Outcome(*next_outcome(outcome, loop, altitude, truth.geometric))
+    return Outcome(*next_outcome(outcome, loop, steps, altitude, truth))
 
 
 def lanes_of(rows: Array, first: int) -> Array:

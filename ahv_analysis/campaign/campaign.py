@@ -121,7 +121,7 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     if hardware is None:
         outcomes = fly_batch(states, dispersions, truth, control, steps)
     else:
-        noise = [noise_stream(hardware, campaign.seed, run) for run in runs]
+        noise = [noise_stream(hardware, truth.wind, campaign.seed, run) for run in runs]
         starts = np.array([campaign.controls(run) for run in runs])
         outcomes = fly_batch_on_hardware(
             states, dispersions, starts, noise, truth, control, hardware, steps

@@ -8,30 +8,38 @@ from ahv_analysis.campaign.batch import LIKE, lanes_of, starting_at
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.delay import ROWS
 from ahv_plant.hardware.noise import NO_DRAWS
-from ahv_plant.model.constants import SURFACE_MINIMUM, THROTTLE_MAXIMUM
+from ahv_plant.hardware.wind import through_air
+from ahv_plant.model.constants import STEP, SURFACE_MINIMUM, THROTTLE_MAXIMUM
 from ahv_plant.model.vectors import Controls, State, Surfaces
 from ahv_plant.numerics.elementary import atan2
-from ahv_plant.numerics.elementwise import kernel, select
+from ahv_plant.numerics.elementwise import elementwise, kernel, select
 from ahv_plant.numerics.simd import LANES, load, store, widen
-from ahv_plant.plant import Hardware, Rig, plant_step, start_plant
+from ahv_plant.plant import Hardware, Plant, Rig, plant_step, start_plant
 
 NOSE_DOWN_STEPS = 300  # 3 s: what turns at all has turned by then
+
+
+@elementwise
+def _alpha(plant: Plant, number: int, truth: Truth) -> float:
+    moving = through_air(plant.state, number * STEP, plant.turbulence, truth.wind)
+    return atan2(moving.w, moving.u)
 
 
 @kernel
 def nose_down(state, truth, draws, rig):
     """Largest alpha [rad] while elevons are told up to the stop and the throttle to open.
 
-    No law that starts there keeps it smaller: commands are these from the first one on. The
+    No law that starts there keeps it smaller: commands are these from the first one on. It is
+    that against the air, in steady wind and gust; turbulence, which could help, is left out. The
     numbers may be lanes.
     """
     command = Controls(Surfaces(SURFACE_MINIMUM, SURFACE_MINIMUM, 0.0), THROTTLE_MAXIMUM)
-    plant = widen(start_plant(state, draws, rig), state.u)
-    largest = atan2(state.w, state.u)
+    plant = widen(start_plant(state, truth, draws, rig), state.u)
+    largest = _alpha(plant, 0, truth)
     rising = 1.0 + 0.0 * largest
     for number in range(NOSE_DOWN_STEPS):
         plant = widen(plant_step(plant, command, number, truth, draws, rig), state.u)
-        alpha = atan2(plant.state.w, plant.state.u)
+        alpha = _alpha(plant, number + 1, truth)
         rising = select(alpha < 0.0, 0.0 * alpha, rising)  # afterwards it dives, and may tumble
         largest = select(rising == 1.0, max(largest, alpha), largest)
     return largest

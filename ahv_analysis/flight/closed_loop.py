@@ -27,9 +27,11 @@ class Loop(NamedTuple):
 
 
 @elementwise
-def start_loop(state: State, control: FlightControl, draws: Draws | None, rig: Rig | None) -> Loop:
+def start_loop(
+    state: State, truth: Truth, control: FlightControl, draws: Draws | None, rig: Rig | None
+) -> Loop:
     """Loop at the first state of a flight; without a rig the hardware is ideal."""
-    plant = start_plant(state, draws, rig)
+    plant = start_plant(state, truth, draws, rig)
     memory, commands = start(plant.measured, control)
     return Loop(plant, memory, commands)
 

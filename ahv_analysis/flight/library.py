@@ -39,8 +39,8 @@ INTERRUPTED = "interrupted"  # why a flight ended early, where a signal does not
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the model no longer describes the vehicle."""
     truth, control, equipped = case.plant.truth, case.control, rig(case.plant.hardware)
-    draws = all_draws(case.plant.hardware, *case.plant.noise)
-    loop = start_loop(case.plant.initial, control, next(draws), equipped)
+    draws = all_draws(case.plant.hardware, truth.wind, *case.plant.noise)
+    loop = start_loop(case.plant.initial, truth, control, next(draws), equipped)
     for number in range(case.plant.steps):
         later = loop_step(loop, number, truth, control, next(draws), equipped)
         reason = termination_reason(later.plant.state, truth.geometric, (number + 1) * STEP)

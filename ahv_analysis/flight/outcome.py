@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 from ahv_analysis.flight.closed_loop import Loop
 from ahv_control.disturbance_learner import LearnerState
-from ahv_plant.model.constants import UNSTART_ALPHA
+from ahv_plant.dispersion import Truth
+from ahv_plant.hardware.wind import through_air
+from ahv_plant.model.constants import STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementary import atan2, atan_ratio
 from ahv_plant.numerics.elementwise import elementwise, kernel, select
@@ -62,10 +64,13 @@ def observer_error(state: State, learner: LearnerState | None) -> float:
 
 
 @elementwise
-def cause_now(state: State, status: int, geometric: bool) -> float:
-    """Cause for which a flight fails at a state whose surfaces were found with `status`."""
+def cause_now(state: State, moving: State, status: int, geometric: bool) -> float:
+    """Cause for which a flight fails at a state whose surfaces were found with `status`.
+
+    `moving` has the velocity against the air: the inlet knows no other.
+    """
     left = termination(state, geometric)
-    unstart = select(abs(atan2(state.w, state.u)) > UNSTART_ALPHA, 4.0, 0.0)
+    unstart = select(abs(atan2(moving.w, moving.u)) > UNSTART_ALPHA, 4.0, 0.0)
     lost = select(status == 3, 3.0, unstart)
     spent = select(left == 3, 5.0, lost)
     outside = select(left == 2, 2.0, spent)
@@ -74,31 +79,37 @@ def cause_now(state: State, status: int, geometric: bool) -> float:
 
 @kernel
 def first_cause(states, lost, geometric):
-    """Cause at the first of `states` (n, 13) that has one, if the surfaces are lost at `lost`."""
+    """Cause at the first of `states` (n, 13) that has one, if the surfaces are lost at `lost`.
+
+    States alone do not tell the wind: in wind, the angle of attack is that over the ground.
+    """
     for step in range(len(states)):
         s = states[step]
         state = State(
             s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11], s[12]
         )
-        cause = cause_now(state, 3 if step == lost else 0, geometric)
+        cause = cause_now(state, state, 3 if step == lost else 0, geometric)
         if cause != 0.0:
             return cause
     return 0.0
 
 
 @elementwise
-def next_outcome(outcome: Outcome, loop: Loop, altitude: float, geometric: bool) -> Outcome:
+def next_outcome(
+    outcome: Outcome, loop: Loop, number: int, altitude: float, truth: Truth
+) -> Outcome:
     """Outcome after one more state and its answer; once a run has failed nothing changes.
 
-    `altitude` [m] is h*; `geometric` says which altitude h is.
+    `number` counts the steps flown before, `altitude` [m] is h*. Angles are those against the air.
     """
     state, answer = loop.plant.state, loop.commands
     observed = observer_error(loop.plant.measured.state, loop.memory)
-    alpha = abs(atan2(state.w, state.u))
-    v = abs(state.v)
-    beta = atan_ratio(v, abs(state.u))  # close to asin(v / V_t), and never more
+    moving = through_air(state, number * STEP, loop.plant.turbulence, truth.wind)
+    alpha = abs(atan2(moving.w, moving.u))
+    v = abs(moving.v)
+    beta = atan_ratio(v, abs(moving.u))  # close to asin(v / V_t), and never more
     flying = outcome.cause == 0.0
-    cause = select(flying, cause_now(state, answer.status, geometric), outcome.cause)
+    cause = select(flying, cause_now(state, moving, answer.status, truth.geometric), outcome.cause)
     counts = cause == 0.0
     surfaces = answer.surfaces
     least = -max(-surfaces.right_elevon, -surfaces.left_elevon, -surfaces.rudder)

@@ -16,6 +16,7 @@ from ahv_plant.hardware.actuators import (
     servo_rate,
     settled,
 )
+from ahv_plant.hardware.wind import TurbulentAir, through_air
 from ahv_plant.model.constants import STEP
 from ahv_plant.model.vectors import Controls, State, Surfaces
 from ahv_plant.numerics.elementary import atan2
@@ -90,11 +91,14 @@ def along_servos(servos: Servos, rates: Servos, time: float) -> Servos:
 
 @elementwise
 def positions(
-    state: State, servos: Servos, told: Controls, time: float, by: Actuators
+    moving: State, servos: Servos, told: Controls, time: float, by: Actuators
 ) -> Controls:
-    """Where the controls are at `time` [s]; what is afloat lies in the wind, at -alpha or beta."""
-    alpha = atan2(state.w, state.u)
-    beta = atan2(state.v, abs(state.u))
+    """Where the controls are at `time` [s]; what is afloat lies in the wind, at -alpha or beta.
+
+    `moving` is a state with the velocity against the air.
+    """
+    alpha = atan2(moving.w, moving.u)
+    beta = atan2(moving.v, abs(moving.u))
     surfaces = told.surfaces
     right = moved(servos.right_elevon, surfaces.right_elevon, by.right_elevon)
     left = moved(servos.left_elevon, surfaces.left_elevon, by.left_elevon)
@@ -119,40 +123,49 @@ def rate_on_actuators(
     time: float,
     truth: Truth,
     by: Actuators,
+    turbulence: TurbulentAir | None,
 ) -> State:
     """Rates of the vehicle's states at `time` [s], with the controls where the servos are.
 
     What fails, fails between two steps: it goes by the time when this one has `begun`.
     """
-    at = positions(state, servos, told, begun, by)
+    moving = through_air(state, time, turbulence, truth.wind)
+    at = positions(moving, servos, told, begun, by)
     acting = Surfaces(
         effect(at.surfaces.right_elevon, begun, by.right_elevon),
         effect(at.surfaces.left_elevon, begun, by.left_elevon),
         effect(at.surfaces.rudder, begun, by.rudder),
     )
-    return state_rate(state, acting, effect(at.throttle, begun, by.throttle), time, truth)
+    power = effect(at.throttle, begun, by.throttle)
+    return state_rate(state, acting, power, time, truth, turbulence)
 
 
 @elementwise
 def step_on_actuators(
-    state: State, servos: Servos, command: Controls, time: float, truth: Truth, by: Actuators
+    state: State,
+    servos: Servos,
+    command: Controls,
+    time: float,
+    truth: Truth,
+    by: Actuators,
+    turbulence: TurbulentAir | None = None,
 ) -> tuple[State, Servos, Controls]:
     """Vehicle, servos and controls 0.01 s after `time` [s] under a held command.
 
-    Runge-Kutta of fourth order, as for the vehicle alone.
+    Runge-Kutta of fourth order, as for the vehicle alone; turbulence is held as well.
     """
     half, middle, end = 0.5 * STEP, time + 0.5 * STEP, time + STEP
     told = told_servos(servos, command, time, by)
-    k1 = rate_on_actuators(state, servos, told, time, time, truth, by)
+    k1 = rate_on_actuators(state, servos, told, time, time, truth, by, turbulence)
     r1 = servo_rates(servos, told, time, by)
     at = along_servos(servos, r1, half)
-    k2 = rate_on_actuators(along(state, k1, half), at, told, time, middle, truth, by)
+    k2 = rate_on_actuators(along(state, k1, half), at, told, time, middle, truth, by, turbulence)
     r2 = servo_rates(at, told, time, by)
     at = along_servos(servos, r2, half)
-    k3 = rate_on_actuators(along(state, k2, half), at, told, time, middle, truth, by)
+    k3 = rate_on_actuators(along(state, k2, half), at, told, time, middle, truth, by, turbulence)
     r3 = servo_rates(at, told, time, by)
     at = along_servos(servos, r3, STEP)
-    k4 = rate_on_actuators(along(state, k3, STEP), at, told, time, end, truth, by)
+    k4 = rate_on_actuators(along(state, k3, STEP), at, told, time, end, truth, by, turbulence)
     r4 = servo_rates(at, told, time, by)
     ends = along(along(state, k1, STEP / 6.0), k4, STEP / 6.0)
     later = along(along(ends, k2, STEP / 3.0), k3, STEP / 3.0)
@@ -164,4 +177,5 @@ def step_on_actuators(
         settled(now.rudder, told.surfaces.rudder, by.rudder),
         settled(now.throttle, told.throttle, by.throttle),
     )
-    return later, servos, positions(later, servos, told, time, by)
+    moving = through_air(later, end, turbulence, truth.wind)
+    return later, servos, positions(moving, servos, told, time, by)

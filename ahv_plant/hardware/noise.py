@@ -52,7 +52,7 @@ class Channel(IntEnum):
     late = 122
 
 
-class Gust(NamedTuple):
+class Driving(NamedTuple):
     """Unit normals [-] that drive the turbulence along the body axes."""
 
     u: float
@@ -64,7 +64,7 @@ class Draws(NamedTuple):
     """What chance gives one step, in the order of `Channel`."""
 
     noise: Noise
-    gust: Gust
+    gust: Driving
     late: float  # [-] 1 where the commands take a step longer, else 0
 
 
@@ -113,7 +113,7 @@ class NoiseStream:
 # A step without chance; also what a step of a block looks like to `load`, which fills lanes.
 NO_DRAWS = Draws(
     Noise(State(*[0.0] * 13), Surfaces(0.0, 0.0, 0.0), AirVelocity(0.0, 0.0, 0.0)),  # [-]
-    Gust(0.0, 0.0, 0.0),
+    Driving(0.0, 0.0, 0.0),
     0.0,
 )
 
@@ -141,6 +141,6 @@ def draws_of(row: Array) -> Draws:
             Surfaces(row[13], row[14], row[15]),
             AirVelocity(row[16], row[17], row[18]),
         ),
-        Gust(row[19], row[20], row[21]),
+        Driving(row[19], row[20], row[21]),
         row[22],
     )

@@ -63,19 +63,23 @@ def lag(time_constant: float) -> float:
     return 1.0 if time_constant < SHORTEST_LAG else 1.0 - exp_small(-STEP / time_constant)
 
 
-def sensor_settings(values: Mapping[str, Value]) -> Sensors | None:
-    """Sensors in SI units from checked parameters; None if every one is perfect."""
+def sensor_settings(values: Mapping[str, Value], windy: bool = False) -> Sensors | None:
+    """Sensors in SI units from checked parameters; None if they tell the state as it is.
+
+    Where it is windy, perfect sensors of air data tell another velocity than that over the ground.
+    """
     by_air = bool(values["air_data_sensors"])
     sensors: dict[str, Any] = {channel: _sensor(values, channel) for channel in _MEASURED}
     sensors |= dict.fromkeys("uvw" if by_air else AirVelocity._fields, PERFECT)
-    if set(sensors.values()) == {PERFECT}:
+    against_air = by_air and windy
+    if set(sensors.values()) == {PERFECT} and not against_air:
         return None
     air = [sensors[name] for name in AirVelocity._fields]
     return Sensors(
         State(*(sensors[name] for name in State._fields)),
         Surfaces(*(sensors[name] for name in Surfaces._fields)),
-        # perfect air data are the true u, v, w, without the rounding of the way there and back
-        None if set(air) == {PERFECT} else AirVelocity(*air),
+        # in still air perfect ones are the true u, v, w, without rounding on the way and back
+        None if set(air) == {PERFECT} and not against_air else AirVelocity(*air),
     )
 
 

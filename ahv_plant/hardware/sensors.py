@@ -40,8 +40,8 @@ class AirVelocity(NamedTuple):
 class Sensors(NamedTuple):
     """A Sensor for each channel, in the vectors of what they measure.
 
-    With `air`, the measured u, v, w are those of the measured angles and speed, and the sensors of
-    u, v, w have no say.
+    With `air`, the measured u, v, w are those of the measured angles and speed, which are against
+    the air, and the sensors of u, v, w, which are over the ground, have no say.
     """
 
     state: Any  # State of Sensor
@@ -85,20 +85,20 @@ def reading(value: float, normal: float, sensor: Sensor) -> float:
 
 
 @elementwise
-def air_velocity(state: State) -> AirVelocity:
-    """True angles [rad] and speed [m/s]."""
-    air = air_data(state, False)  # of which altitude has no part in these three
+def air_velocity(moving: State) -> AirVelocity:
+    """True angles [rad] and speed [m/s] of a state with the velocity against the air."""
+    air = air_data(moving, False)  # of which altitude has no part in these three
     return AirVelocity(air.alpha, air.beta, air.speed)
 
 
 @optional
-def _settled_air(state: State, air: Any) -> AirVelocity:
-    return air_velocity(state)
+def _settled_air(moving: State, air: Any) -> AirVelocity:
+    return air_velocity(moving)
 
 
 @optional
-def _lagged_air(kept: AirVelocity, state: State, air: Any) -> AirVelocity:
-    true = air_velocity(state)
+def _lagged_air(kept: AirVelocity, moving: State, air: Any) -> AirVelocity:
+    true = air_velocity(moving)
     return AirVelocity(
         lagged(kept.alpha, true.alpha, air.alpha),
         lagged(kept.beta, true.beta, air.beta),
@@ -193,18 +193,26 @@ def read(memory: SensorMemory, noise: Noise, sensors: Sensors) -> Measurement:
 
 @elementwise
 def first_measurement(
-    state: State, surfaces: Surfaces, noise: Noise, sensors: Sensors
+    state: State, moving: State, surfaces: Surfaces, noise: Noise, sensors: Sensors
 ) -> tuple[SensorMemory, Measurement]:
-    """Memory and measurement at the first state of a flight, where every lag has settled."""
-    memory = SensorMemory(state, surfaces, _settled_air(state, sensors.air))
+    """Memory and measurement at the first state of a flight, where every lag has settled.
+
+    `moving` has the velocity against the air, which is what air data sensors feel.
+    """
+    memory = SensorMemory(state, surfaces, _settled_air(moving, sensors.air))
     return memory, read(memory, noise, sensors)
 
 
 @elementwise
 def measure(
-    memory: SensorMemory, state: State, surfaces: Surfaces, noise: Noise, sensors: Sensors
+    memory: SensorMemory,
+    state: State,
+    moving: State,
+    surfaces: Surfaces,
+    noise: Noise,
+    sensors: Sensors,
 ) -> tuple[SensorMemory, Measurement]:
-    """Memory and measurement one sample later, with the state and the surfaces as they are."""
+    """Memory and measurement one sample later, with all as it is, as in `first_measurement`."""
     kept, by = memory.surfaces, sensors.surfaces
     memory = SensorMemory(
         lagged_state(memory.state, state, sensors.state),
@@ -213,6 +221,6 @@ def measure(
             lagged(kept.left_elevon, surfaces.left_elevon, by.left_elevon),
             lagged(kept.rudder, surfaces.rudder, by.rudder),
         ),
-        _lagged_air(memory.air, state, sensors.air),
+        _lagged_air(memory.air, moving, sensors.air),
     )
     return memory, read(memory, noise, sensors)

@@ -137,6 +137,39 @@ def turbulence_step(
     )
 
 
+@optional
+def _calm(turbulence: Turbulence) -> TurbulentAir:
+    return CALM
+
+
+@optional
+def calm_air(wind: Wind) -> TurbulentAir | None:
+    """Air [m/s, -] before a flight; None where it never becomes turbulent."""
+    air: TurbulentAir | None = _calm(wind.turbulence)
+    return air
+
+
+@optional
+def _later(
+    air: TurbulentAir, noise: tuple[float, float, float], turbulence: Turbulence
+) -> TurbulentAir:
+    return turbulence_step(air, noise, turbulence)
+
+
+@optional
+def turbulent_air(
+    air: TurbulentAir | None, noise: tuple[float, float, float], wind: Wind
+) -> TurbulentAir | None:
+    """Air [m/s, -] a step later, driven by three unit normals `noise` [-]; None as `calm_air`."""
+    later: TurbulentAir | None = _later(air, noise, wind.turbulence)
+    return later
+
+
+def is_turbulent(wind: Wind | None) -> bool:
+    """Whether a flight needs draws for its air."""
+    return wind is not None and wind.turbulence is not None
+
+
 def _still(state: State) -> Velocity:
     return Velocity(0.0, 0.0, 0.0)
 
