@@ -17,6 +17,7 @@ from ahv_analysis.command.console import UsageError, print_json
 from ahv_analysis.command.faults import faults
 from ahv_analysis.command.figures import figures
 from ahv_analysis.command.fly import CaseCommand, fly
+from ahv_analysis.command.map import map_rates
 from ahv_analysis.command.replay import replay
 from ahv_analysis.command.report import report
 from ahv_analysis.command.trim import trim
@@ -33,6 +34,7 @@ IN_ORDER = (
     "replay",
     "monte-carlo",
     "table",
+    "map",
     "faults",
     "trim",
 )
@@ -129,6 +131,7 @@ app.add_typer(bag, name="bag")
 app.command()(replay)
 app.add_typer(monte_carlo, name="monte-carlo")
 app.command()(table)
+app.command(name="map")(map_rates)
 app.add_typer(faults, name="faults")
 app.command()(trim)
 

@@ -114,7 +114,7 @@ def fly(
             with progress_bar(f"{case.name} at {one:g}", runs, as_json, unit="runs") as progress:
                 reported = Reported(progress)
                 started = time.perf_counter()
-                interrupted_says(partial(_kept, reported, runs))
+                interrupted_says(partial(kept_words, reported, runs))
                 with signals_wait() as interrupted:
                     fly_campaign(campaign, folder, pool, reported, interrupted)
                 wall = time.perf_counter() - started
@@ -129,7 +129,7 @@ def fly(
         _show(summary)
 
 
-def _kept(reported: Reported, runs: int) -> str:
+def kept_words(reported: Reported, runs: int) -> str:
     """What an interrupted campaign keeps."""
     return f"after {max(reported.last, 0)} of {runs} runs; the same command resumes"
 
@@ -248,7 +248,7 @@ def table(
         progress_bar("Table 5.1", total, as_json, unit="runs") as progress,
     ):
         reported = Reported(progress)
-        interrupted_says(partial(_kept, reported, total))
+        interrupted_says(partial(kept_words, reported, total))
         with signals_wait() as interrupted:
             rows = fly_table(
                 folder, pool, seed, runs, protected, reported, interrupted, hardware=hardware

@@ -1,0 +1,145 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""The command `ahv map`."""
+
+import json
+import textwrap
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ahv_analysis.command.campaign import CORES, Dask, Seed, Workers, executor_of, kept_words
+from ahv_analysis.command.console import (
+    HardwareChoice,
+    Json,
+    Reported,
+    UsageError,
+    hardware_words,
+    integer_option,
+    print_json,
+    progress_bar,
+)
+from ahv_analysis.interrupt import interrupted_says, signals_wait
+
+if TYPE_CHECKING:  # it takes long to load
+    from ahv_analysis.campaign.map import Map, Point
+
+AXIS = "NAME=LOW:HIGH[:COUNT]"
+
+
+def map_rates(
+    case: Annotated[str, typer.Argument(help="Name of a case, or a YAML file.")],
+    x: Annotated[
+        str,
+        typer.Option(
+            "--x",
+            metavar=AXIS,
+            help="Horizontal axis: a parameter, a pattern of several, or level.",
+        ),
+    ],
+    y: Annotated[str, typer.Option("--y", metavar=AXIS, help="Vertical axis.")],
+    hardware: HardwareChoice = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="NAME=VALUE", help="A parameter that differs; any number of them."
+        ),
+    ] = None,
+    level: Annotated[
+        float | None, typer.Option(help="Dispersion, by default 0.3.", show_default=False)
+    ] = None,
+    runs: Annotated[int, integer_option("Vehicles a point, the same at each.", 1)] = 200,
+    seed: Seed = 0,
+    workers: Workers = CORES,
+    dask: Dask = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the map; one that is there is resumed.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly the success rate over two parameters: a heat map, a table and a campaign a point."""
+    from ahv_analysis.campaign.map import (
+        LEVEL,
+        Map,
+        fly_map,
+        rates,
+        read_axis,
+        read_settings,
+        set_apart,
+        with_value,
+        write_map,
+    )
+    from ahv_analysis.flight.case import load_case
+    from ahv_analysis.report.map_figure import draw_map, save_map
+
+    axes = read_axis(x), read_axis(y)
+    given = read_settings(settings or [])
+    set_apart(*axes, given)
+    by_axis = LEVEL.name in (axes[0].name, axes[1].name)
+    if by_axis and level is not None:
+        raise UsageError("--level and an axis both set the level")
+    chosen = float(LEVEL.check("map", LEVEL.default if level is None else level))
+    flown_case = load_case(case, hardware=hardware)
+    for places, value in given.values():
+        flown_case = with_value(flown_case, places, value)
+    flown = Map(flown_case, *axes, chosen, runs, seed)
+    words = hardware_words(hardware)
+    folder = out or Path("maps") / "-".join([flown_case.name, *words])
+    total = runs * len(flown.campaigns)
+    started = time.perf_counter()
+    with (
+        executor_of(workers, dask) as pool,
+        progress_bar(f"map of {flown_case.name}", total, as_json, unit="runs") as progress,
+    ):
+        reported = Reported(progress)
+        interrupted_says(partial(kept_words, reported, total))
+        with signals_wait() as interrupted:
+            points = fly_map(flown, folder, pool, reported, interrupted)
+    wall = time.perf_counter() - started
+    described: dict[str, Any] = {
+        "case": flown_case.name,
+        "hardware": words[0] if words else None,
+        "set": {name: value for name, (_, value) in given.items()},
+        "level": None if by_axis else chosen,
+        "seed": seed,
+        "runs": runs,
+        "x": {"name": axes[0].name, "unit": axes[0].unit, "values": axes[0].values},
+        "y": {"name": axes[1].name, "unit": axes[1].unit, "values": axes[1].values},
+    }
+    write_map(folder, points, described)
+    title = assumptions(described)
+    figure = draw_map(*axes, rates(flown, points), textwrap.fill(title, 68))
+    save_map(figure, folder / "map.png")
+    if as_json:
+        rows = [point._asdict() for point in points]
+        print_json({**described, "points": rows, "wall_s": wall, "out": str(folder)})
+    else:
+        print(f"{title}\n\n{rate_table(flown, points)}\n")
+        print(f"{total} flights in {wall:.0f} s; kept in {folder}")
+
+
+def assumptions(described: dict[str, Any]) -> str:
+    """What a map was flown with, in a line."""
+    parts = [described["case"]]
+    if described["hardware"] is not None:
+        parts.append(f"{described['hardware']} hardware")
+    parts += [f"{name} = {json.dumps(value)}" for name, value in described["set"].items()]
+    if described["level"] is not None:
+        parts.append(f"level {described['level']:g}")
+    return ", ".join([*parts, f"{described['runs']} runs a point", f"seed {described['seed']}"])
+
+
+def rate_table(flown: "Map", points: "list[Point]") -> str:
+    """Success rates in percent as they lie on the map: y upwards, x to the right."""
+    rate = {(point.x, point.y): f"{100.0 * point.success_rate:.1f}" for point in points}
+    rows = [[f"{y:g}", *(rate[x, y] for x in flown.x.values)] for y in reversed(flown.y.values)]
+    rows.append(["", *(f"{x:g}" for x in flown.x.values)])
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        for row in rows
+    ]
+    head = f"success [%], {flown.y.title} upwards, {flown.x.title} to the right"
+    return "\n".join([head, *lines])
