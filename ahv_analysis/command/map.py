@@ -59,7 +59,11 @@ def map_rates(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Fly the success rate over two parameters: a heat map, a table and a campaign a point."""
+    """Fly the success rate over any two parameters, as a heat map.
+
+    Every point is a campaign of the same vehicles, kept in the folder with map.png, map.parquet
+    and map.json. NAME is a parameter of any node, a shell pattern for several, or level.
+    """
     from ahv_analysis.campaign.map import (
         LEVEL,
         Map,
