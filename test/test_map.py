@@ -14,13 +14,14 @@ from ahv_analysis.campaign.campaign import Campaign, fly_runs
 from ahv_analysis.campaign.map import (
     Map,
     fly_map,
+    places_of,
     read_axis,
     read_settings,
     with_value,
 )
 from ahv_analysis.campaign.store import part_files, read_part
 from ahv_analysis.errors import CampaignError
-from ahv_analysis.flight.case import load_case, make_case
+from ahv_analysis.flight.case import load_case, make_case, read_case
 from ahv_analysis.report.map_figure import CONTOURS, draw_map
 from test.test_command import told
 
@@ -30,8 +31,9 @@ X, Y = "latency.delay=0.02:0.04:2", "sensor.[PQR].noise=0:0.2:2"
 
 
 def tiny(x=X, y=Y, level=0.3, runs=RUNS):
-    case = load_case(CASE, {"duration": 1.0}, hardware="typical")
-    return Map(case, read_axis(x), read_axis(y), level, runs, 5)
+    _, given = read_case(CASE, hardware="typical")
+    given = with_value(given, places_of("duration"), 1.0)
+    return Map(CASE, given, read_axis(x), read_axis(y), level, runs, 5)
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +125,7 @@ def test_a_pattern_sets_every_parameter_of_its_kind_in_every_node():
     assert sorted(names) == [
         (node, f"k_ap_{rate}") for node in ("disturbance_learner", "inner_loop") for rate in "PQR"
     ]
-    case = with_value(load_case(CASE), gains.places, 7.0)
+    case = make_case(CASE, with_value(read_case(CASE)[1], gains.places, 7.0))
     changed = {
         (node, name)
         for node, values in load_case(CASE).parameters.items()
@@ -134,6 +136,18 @@ def test_a_pattern_sets_every_parameter_of_its_kind_in_every_node():
     assert tuple(case.control.inner.k_ap) == (7.0, 7.0, 7.0)
 
 
+def test_what_the_hardware_of_a_point_decides_is_decided_at_the_point():
+    """A case that is ideal has no measured surfaces; a point of it that has a delay does."""
+    map_ = Map(CASE, read_case(CASE)[1], read_axis("latency.delay=0:0.02:2"), tiny().y, 0.3, 1, 0)
+    heard = {
+        x: c.case.control.learner.measured_surfaces
+        for (x, y), c in map_.campaigns.items()
+        if y == 0.0
+    }
+    delayed = load_case(CASE, {"latency.delay": 0.02}).control.learner.measured_surfaces
+    assert heard == {0.0: False, 0.02: delayed}
+
+
 def test_values_of_an_axis_are_those_that_one_would_write():
     assert read_axis("latency.delay=0:0.1:11").values == tuple(n / 100 for n in range(11))
     assert read_axis("latency.delay=0:0.1").title == "latency.delay [s]"
@@ -142,9 +156,10 @@ def test_values_of_an_axis_are_those_that_one_would_write():
 
 def test_a_setting_has_the_type_of_its_parameter():
     settings = read_settings(["measured_surfaces=false", "duration=60"])
-    case = load_case(CASE, hardware="typical")
+    _, given = read_case(CASE, hardware="typical")
     for places, value in settings.values():
-        case = with_value(case, places, value)
+        given = with_value(given, places, value)
+    case = make_case(CASE, given)
     assert case.parameters["disturbance_learner"]["measured_surfaces"] is False
     assert case.plant.steps == 6000
 

@@ -19,9 +19,9 @@ import yaml
 
 from ahv_analysis.campaign.campaign import Campaign, fly_campaign
 from ahv_analysis.campaign.summary import summarize_campaign
-from ahv_analysis.flight.case import Case, make_case
+from ahv_analysis.flight.case import make_case
 from ahv_msgs_py.graph import NODES, case_nodes
-from ahv_msgs_py.parameters import Parameter, ParameterError, Value, meant
+from ahv_msgs_py.parameters import Parameter, ParameterError, meant
 from ahv_plant.dispersion import HIGHEST_LEVEL, Dispersion
 
 LEVEL = Parameter("level", 0.3, "dispersion of the draws", "", 0.0, HIGHEST_LEVEL)
@@ -30,6 +30,7 @@ COUNT = 6  # values of an axis, if it is not said
 POINTS_AT_ONCE = 16  # so that points of few runs keep every worker busy
 AXIS = re.compile(r"([^=]+)=([^:]+):([^:]+)(?::([^:]+))?")
 
+Given = Mapping[str, Mapping[str, object]]  # parameters by node
 Places = tuple[tuple[str, Parameter], ...]  # nodes, and the parameter of each; none: the level
 
 
@@ -92,7 +93,7 @@ def read_axis(text: str) -> Axis:
     return Axis(name, units[0] if units else "", values, places)
 
 
-def read_settings(texts: Sequence[str]) -> dict[str, tuple[Places, Value]]:
+def read_settings(texts: Sequence[str]) -> dict[str, tuple[Places, object]]:
     """Places and value of each NAME=VALUE; ParameterError says what is wrong with one."""
     settings = {}
     for text in texts:
@@ -108,15 +109,15 @@ def read_settings(texts: Sequence[str]) -> dict[str, tuple[Places, Value]]:
     return settings
 
 
-def with_value(case: Case, places: Places, value: Value) -> Case:
-    """Return the case with `value` at all of these places."""
-    parameters = {node: dict(values) for node, values in case.parameters.items()}
+def with_value(given: Given, places: Places, value: object) -> Given:
+    """Return the parameters by node with `value` at all of these places."""
+    changed = {node: dict(values) for node, values in given.items()}
     for node, parameter in places:
-        parameters[node][parameter.name] = _typed(parameter, value)
-    return make_case(case.name, parameters)
+        changed.setdefault(node, {})[parameter.name] = _typed(parameter, value)
+    return changed
 
 
-def _typed(parameter: Parameter, value: Value) -> Value:
+def _typed(parameter: Parameter, value: object) -> object:
     """An integer where the parameter is one and the value whole."""
     whole = type(parameter.default) is int and isinstance(value, float) and value.is_integer()
     return int(value) if whole else value
@@ -126,7 +127,8 @@ def _typed(parameter: Parameter, value: Value) -> Value:
 class Map:
     """What is flown: `runs` vehicles at every point, those of the same seed."""
 
-    case: Case
+    case: str
+    given: Given  # its parameters: those that the axes do not set
     x: Axis
     y: Axis
     level: float  # [-] where no axis is the level
@@ -139,20 +141,20 @@ class Map:
         return {(x, y): self._campaign(x, y) for y in self.y.values for x in self.x.values}
 
     def _campaign(self, x: float, y: float) -> Campaign:
-        case, level = self.case, self.level
+        given, level = self.given, self.level
         for axis, value in ((self.x, x), (self.y, y)):
             if axis.places:
-                case = with_value(case, axis.places, value)
+                given = with_value(given, axis.places, value)
             else:
                 level = value
-        return Campaign(case, level, self.runs, self.seed)
+        return Campaign(make_case(self.case, given), level, self.runs, self.seed)
 
     def folder(self, out: Path, x: float, y: float) -> Path:
         """Folder of a point's campaign: a finer map takes what a coarser one flew."""
         return out / "points" / f"{self.x.name}={x:.12g},{self.y.name}={y:.12g}"
 
 
-def set_apart(x: Axis, y: Axis, settings: Mapping[str, tuple[Places, Value]]) -> None:
+def set_apart(x: Axis, y: Axis, settings: Mapping[str, tuple[Places, object]]) -> None:
     """Raise ParameterError if two of them set the same."""
     of_axes = [(x.name, x.places or (("map", LEVEL),)), (y.name, y.places or (("map", LEVEL),))]
     taken: dict[tuple[str, str], str] = {}
@@ -221,8 +223,9 @@ def fly_map(
 
 
 def _point(point: tuple[float, float], summary: Mapping[str, Any]) -> Point:
-    counts = (summary[name] for name in ("runs", "successes", "success_rate"))
-    return Point(*point, *counts, *summary["interval"], summary["beyond_saving"])
+    runs, successes = summary["runs"], summary["successes"]
+    interval, beyond_saving = summary["interval"], summary["beyond_saving"]
+    return Point(*point, runs, successes, summary["success_rate"], *interval, beyond_saving)
 
 
 def write_map(out: Path, points: Sequence[Point], described: Mapping[str, Any]) -> None:

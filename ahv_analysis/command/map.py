@@ -24,7 +24,7 @@ from ahv_analysis.command.console import (
 from ahv_analysis.interrupt import interrupted_says, signals_wait
 
 if TYPE_CHECKING:  # it takes long to load
-    from ahv_analysis.campaign.map import Map, Point
+    from ahv_analysis.campaign.map import Given, Map, Point
 
 AXIS = "NAME=LOW:HIGH[:COUNT]"
 
@@ -75,27 +75,28 @@ def map_rates(
         with_value,
         write_map,
     )
-    from ahv_analysis.flight.case import load_case
+    from ahv_analysis.flight.case import read_case
     from ahv_analysis.report.map_figure import draw_map, save_map
 
     axes = read_axis(x), read_axis(y)
-    given = read_settings(settings or [])
-    set_apart(*axes, given)
+    changes = read_settings(settings or [])
+    set_apart(*axes, changes)
     by_axis = LEVEL.name in (axes[0].name, axes[1].name)
     if by_axis and level is not None:
         raise UsageError("--level and an axis both set the level")
     chosen = float(LEVEL.check("map", LEVEL.default if level is None else level))
-    flown_case = load_case(case, hardware=hardware)
-    for places, value in given.values():
-        flown_case = with_value(flown_case, places, value)
-    flown = Map(flown_case, *axes, chosen, runs, seed)
+    name, given = read_case(case, hardware=hardware)
+    parameters: Given = given
+    for places, value in changes.values():
+        parameters = with_value(parameters, places, value)
+    flown = Map(name, parameters, *axes, chosen, runs, seed)
     words = hardware_words(hardware)
-    folder = out or Path("maps") / "-".join([flown_case.name, *words])
+    folder = out or Path("maps") / "-".join([name, *words])
     total = runs * len(flown.campaigns)
     started = time.perf_counter()
     with (
         executor_of(workers, dask) as pool,
-        progress_bar(f"map of {flown_case.name}", total, as_json, unit="runs") as progress,
+        progress_bar(f"map of {name}", total, as_json, unit="runs") as progress,
     ):
         reported = Reported(progress)
         interrupted_says(partial(kept_words, reported, total))
@@ -103,9 +104,9 @@ def map_rates(
             points = fly_map(flown, folder, pool, reported, interrupted)
     wall = time.perf_counter() - started
     described: dict[str, Any] = {
-        "case": flown_case.name,
+        "case": name,
         "hardware": words[0] if words else None,
-        "set": {name: value for name, (_, value) in given.items()},
+        "set": {of: value for of, (_, value) in changes.items()},
         "level": None if by_axis else chosen,
         "seed": seed,
         "runs": runs,

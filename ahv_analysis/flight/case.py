@@ -66,6 +66,24 @@ def notes(case: Case) -> str:
     return json.dumps(content)
 
 
+def read_case(
+    name: str, namespace: str = NAMESPACE, hardware: str | None = None
+) -> tuple[str, dict[str, dict[str, object]]]:
+    """Name of a case, and its parameters by node as the files of case and hardware give them."""
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml") and name in case_names():
+        path = case_path(name)
+    elif not path.is_file():
+        raise ParameterError(
+            f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
+        )
+    given = read_case_file(path, namespace)
+    if hardware is not None:
+        for node, values in load_hardware(hardware, namespace).items():
+            given[node] |= values
+    return path.stem, given
+
+
 def load_case(
     name: str,
     plant: Mapping[str, object] | None = None,
@@ -79,21 +97,11 @@ def load_case(
     where the dispersion comes from, if it was drawn. The file is read as nodes in `namespace` do.
     `hardware` is a name of config/hardware, or a file, whose parameters stand above the case's.
     """
-    path = Path(name)
-    if path.suffix not in (".yaml", ".yml") and name in case_names():
-        path = case_path(name)
-    elif not path.is_file():
-        raise ParameterError(
-            f"case {name!r} is neither a YAML file nor one of {', '.join(case_names())}"
-        )
-    given = read_case_file(path, namespace)
-    if hardware is not None:
-        for node, values in load_hardware(hardware, namespace).items():
-            given[node] |= values
+    name, given = read_case(name, namespace, hardware)
     given["plant"] |= plant or {}
     if draw is not None:  # the noise is that of the run, as in the campaign
         given["plant"] |= {"noise.seed": draw.seed, "noise.run": draw.run}
-    return make_case(path.stem, given, draw)
+    return make_case(name, given, draw)
 
 
 def hardware_names() -> list[str]:
