@@ -101,6 +101,7 @@ def fly(
     from ahv_analysis.flight.case import load_case
     from ahv_analysis.flight.library import fly_library
     from ahv_analysis.report.summary import missing_states, summarize
+    from ahv_plant.hardware.actuator_parameters import failures_in
 
     namespace = f"/{namespace.strip('/')}"
     if not NAMES.fullmatch(namespace):
@@ -151,6 +152,7 @@ def fly(
     summary["dispersion"] = truth.dispersion._asdict()
     if truth.further is not None:
         summary["dispersion"] |= truth.further._asdict()
+    summary["failures"] = failures_in(flight.parameters["plant"])
     summary |= summarize(record, ended_early, missing)
     summary["refused"] = refused_facts(contents)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
@@ -230,6 +232,8 @@ def _print_summary(summary: dict[str, Any]) -> None:
         ("pace", f"{summary['real_time_factor']:.0f} times real time"),
         ("bag", summary["bag"]),
     ]
+    for control, what in summary["failures"].items():
+        rows.append((control.replace("_", " "), what))
     for what, since in summary["outside_the_model"].items():
         rows.append(("outside the model", f"{what} from {since:g} s on"))
     if summary["refused"]:

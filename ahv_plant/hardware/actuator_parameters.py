@@ -80,6 +80,16 @@ LATENCY_PARAMETERS = (
 )
 
 
+def failures_in(values: Mapping[str, Value]) -> dict[str, str]:
+    """What fails in flight, in words, by control."""
+    return {
+        control: f"{str(values[f'failure.{control}']).replace('_', ' ')} "
+        f"from {values['failure.time']:g} s on"
+        for control in _ACTUATORS
+        if values[f"failure.{control}"] != FAILURES[0]
+    }
+
+
 def actuators(values: Mapping[str, Value]) -> Actuators:
     """Actuators in SI units from checked parameters."""
     return Actuators(**{control: _actuator(values, control) for control in _ACTUATORS})
