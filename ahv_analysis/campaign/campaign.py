@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from ahv_analysis.campaign.batch import (
     fly_batch,
     fly_batch_on_hardware,
 )
+from ahv_analysis.campaign.draws import checked_draws
 from ahv_analysis.campaign.nose_down import nose_down, nose_down_alphas
 from ahv_analysis.campaign.store import (
     PART_RUNS,
@@ -39,6 +41,7 @@ from ahv_analysis.flight.case import Case, Draw, dispersion_parameters, make_cas
 from ahv_analysis.flight.outcome import Outcome
 from ahv_analysis.versions import what_computes
 from ahv_plant.dispersion import Dispersion, draw_dispersion, in_calm
+from ahv_plant.draws import Distributions, draw_values
 from ahv_plant.hardware.noise import NO_DRAWS
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, STEP, UNSTART_ALPHA
@@ -69,6 +72,7 @@ class Campaign:
     runs: int
     seed: int
     random_starts: bool = False
+    draws: dict[str, Any] | None = None  # what else is drawn, as a file of `load_draws` holds it
 
     def describe(self) -> dict[str, Any]:
         """All that decides a run: what computes it too, but not the number of runs."""
@@ -78,6 +82,7 @@ class Campaign:
             "level": self.level,
             "seed": self.seed,
             "random_starts": self.random_starts,
+            "draws": self.draws,
             "parameters": self.case.parameters,
         }
 
@@ -96,6 +101,10 @@ class Campaign:
         start = case.plant.hardware.start
         return *start.surfaces, start.throttle
 
+    @cached_property
+    def _distributions(self) -> Distributions | None:
+        return None if self.draws is None else checked_draws(self.draws)
+
     def case_of(self, run: int) -> Case:
         """Return the case that flies one run alone, with the same bits, by any engine."""
         plant = self.case.parameters["plant"] | dispersion_parameters(self.dispersion(run))
@@ -105,14 +114,22 @@ class Campaign:
             )
             for (name, spread), draw in zip(START_SPREAD.items(), draws.tolist(), strict=True):
                 plant[name] = float(plant[name]) + spread * draw
+        if self._distributions is not None:
+            plant |= draw_values(self._distributions, self.seed, run)
         plant |= {"noise.seed": self.seed, "noise.run": run}
         draw = Draw(self.level, self.seed, run, self.random_starts)
         return make_case(self.case.name, self.case.parameters | {"plant": plant}, draw)
 
 
 def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
-    """Fly runs `first` to `first + count - 1`: a column a quantity, as in the campaign's file."""
+    """Fly runs `first` to `first + count - 1`: a column a quantity, as in the campaign's file.
+
+    Runs that differ in more than lanes can differ in are flown one by one.
+    """
     runs = range(first, first + count)
+    if campaign.draws is not None:
+        rows = [fly_again(campaign, run) for run in runs]
+        return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
     dispersions = np.array([campaign.dispersion(run) for run in runs])
     states = np.array([campaign.start(run) for run in runs])
     case = campaign.case
@@ -339,6 +356,7 @@ def _campaign_of(described: dict[str, Any], runs: int) -> Campaign:
         runs,
         described["seed"],
         described["random_starts"],
+        described.get("draws"),  # which older campaigns do not speak of
     )
 
 

@@ -133,6 +133,7 @@ def _description(text: bytes) -> dict[str, Any]:
         and type(seed) is int
         and seed >= 0
         and isinstance(content.get("random_starts"), bool)
+        and isinstance(content.get("draws"), dict | None)
         and "source" in content
     ):
         raise ValueError("it lacks the description")

@@ -87,6 +87,10 @@ def fly(
         bool, typer.Option("--random-starts", help="Section 3.5.2's random starts as well.")
     ] = False,
     hardware: HardwareChoice = None,
+    draws: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="What is drawn besides: distributions in a YAML file."),
+    ] = None,
     workers: Workers = CORES,
     dask: Dask = None,
     out: Annotated[
@@ -98,6 +102,7 @@ def fly(
     if context.invoked_subcommand is not None:
         return
     from ahv_analysis.campaign.campaign import Campaign, fly_campaign
+    from ahv_analysis.campaign.draws import load_draws
     from ahv_analysis.campaign.summary import summarize_campaign
     from ahv_analysis.flight.case import load_case
 
@@ -106,11 +111,13 @@ def fly(
         if not 0.0 <= one <= HIGHEST_LEVEL:
             raise UsageError(f"level {one:g} is outside 0 to {HIGHEST_LEVEL:g}")
     case = load_case(controller + ("_protected" if protected else ""), hardware=hardware)
-    folder = out or Path("campaigns") / "-".join([case.name, *hardware_words(hardware)])
+    drawn = None if draws is None else load_draws(draws)
+    words = [case.name, *hardware_words(hardware), *([] if draws is None else [draws.stem])]
+    folder = out or Path("campaigns") / "-".join(words)
     summaries = []
     with executor_of(workers, dask) as pool:
         for one in levels:
-            campaign = Campaign(case, one, runs, seed, random_starts)
+            campaign = Campaign(case, one, runs, seed, random_starts, drawn)
             with progress_bar(f"{case.name} at {one:g}", runs, as_json, unit="runs") as progress:
                 reported = Reported(progress)
                 started = time.perf_counter()
