@@ -33,7 +33,8 @@ def figures(
     """Draw the report's figures of a flight or a campaign.
 
     As PNG and SVG: 3.2-3.7 of a nominal flight; 4.1-4.5 or 5.1-5.5 of an adaptive one, beside the
-    nominal law; 3.8-3.13, 4.6-4.10 or 5.6-5.10 of a campaign.
+    nominal law; 3.8-3.13, 4.6-4.10 or 5.6-5.10 of a campaign. Of a flight on hardware H.1 and
+    H.2 as well: surfaces, rates and attitude as measured.
     """
     from ahv_analysis.campaign.campaign import first_causes, open_campaign
     from ahv_analysis.report.page_figures import bag_figures, campaign_figures

@@ -94,6 +94,7 @@ FLOWN, NOMINAL, ACTUAL, ADAPTIVE = (
 )
 COLOURS = {FLOWN: "C0", NOMINAL: "0.55", ACTUAL: "C3", ADAPTIVE: "C0"}
 COMMAND_STYLE = {"color": "C0", "alpha": 0.6, "linestyle": "--", "linewidth": 1.0}
+TRUE_STYLE = {"color": "k", "linewidth": 1.0}  # seen before noise
 
 CAMPAIGN_3, CAMPAIGN_4, CAMPAIGN_5 = (
     tuple(Plate(f"{chapter}.{number}", *subject) for number, subject in enumerate(subjects, first))
@@ -143,7 +144,9 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
                 commanded = panel.command(record) if label == subject else None
                 if commanded is not None:
                     command = drawn(flown, commanded[:end])
-                    axis.plot(time, command, label=panel.quantity.reference_words, **COMMAND_STYLE)
+                    words = panel.quantity.reference_words
+                    style = TRUE_STYLE if words == "true" else COMMAND_STYLE
+                    axis.plot(time, command, label=words, **style)
                     seen.append(command)
             _scale(axis, np.concatenate(seen), panel.bound if len(flights) > 1 else None)
             if panel.bound is not None:

@@ -47,7 +47,7 @@ def flight_figures(
     """Which figures of the report a flight is for, and how to draw one.
 
     For an adaptive flight the nominal law is flown from the same start, on the nominal vehicle and
-    on the actual one, with the parameters of its case.
+    on the actual one, with the parameters of its case. Figures of hardware show the flight alone.
     """
     own = () if flown.positions is None else HARDWARE
     if case is None or flown.learner is None:
@@ -56,7 +56,11 @@ def flight_figures(
     ideal = nominal._replace(plant=case.plant._replace(truth=Truth(case.plant.truth.geometric)))
     plates = CHAPTER_4 if case.control.inner.tracking.exponent == 1.0 else CHAPTER_5
     flights = {NOMINAL: _fly(ideal), ACTUAL: _fly(nominal), ADAPTIVE: flown}
-    return plates + own, partial(draw, flights=flights)
+
+    def draw_one(plate: Plate) -> Figure:
+        return draw(plate, {FLOWN: flown} if plate in own else flights)
+
+    return plates + own, draw_one
 
 
 def _fly(case: Case) -> FlightRecord:
