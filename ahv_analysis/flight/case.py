@@ -172,7 +172,7 @@ def make_case(
 
 
 def _check_commands(parameters: Mapping[str, Mapping[str, Value]], plant: PlantSettings) -> None:
-    """ParameterError for an altitude or a speed at which the vehicle model does not hold."""
+    """Raise ParameterError for an altitude or a speed at which the vehicle model does not hold."""
     altitude = float(parameters["outer_intermediate"]["altitude"])
     speed = float(parameters["velocity"]["speed"])
     try:
