@@ -7,10 +7,13 @@ from math import atan, atan2, hypot
 import numpy as np
 import pytest
 
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.record import record_of
 from ahv_analysis.campaign.campaign import Campaign, fly_again, fly_runs
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.closed_loop import loop_step, start_loop
 from ahv_analysis.flight.library import fly
+from ahv_analysis.flight.one_process import fly_graph
 from ahv_analysis.flight.outcome import Cause
 from ahv_plant.hardware.noise import GUSTS, NoiseStream
 from ahv_plant.hardware.wind import CALM, through_air, turbulence_step
@@ -56,6 +59,13 @@ def test_a_run_in_turbulence_is_the_same_in_a_lane_alone_and_step_by_step():
         *_, last = fly(campaign.case_of(run))
         assert last.state.h == rows["final_altitude_m"][run]
         assert last.state.u == rows["final_speed_mps"][run]
+
+
+def test_the_graph_flies_through_the_same_air(tmp_path):
+    case = load_case("neuro_adaptive_sc_gdi", ROUGH | {"duration": 3.0})
+    assert fly_graph(case, tmp_path / "bag")[0] == ""
+    flown, alone = read_bag(tmp_path / "bag"), record_of(fly(case), False)
+    assert np.asarray(flown.states).tobytes() == np.asarray(alone.states).tobytes()
 
 
 def test_no_two_runs_meet_the_same_turbulence():
