@@ -73,6 +73,7 @@ def test_no_two_runs_meet_the_same_turbulence():
     assert len(set(fly_runs(campaign, 0, 3)["final_altitude_m"])) == 3
 
 
+@pytest.mark.unit
 def test_a_flight_meets_the_turbulence_that_its_filters_make_of_its_draws():
     case = load_case("nominal_di", TURBULENT)
     air, filters = CALM, case.plant.truth.wind.turbulence
@@ -108,6 +109,7 @@ def test_an_updraught_unstarts_the_inlet_though_the_vehicle_does_not_pitch():
     assert row["nose_down_alpha_deg"] > 0.5 * row["max_abs_alpha_deg"]
 
 
+@pytest.mark.unit
 def test_air_data_tell_the_velocity_against_the_air_and_the_rest_is_as_it_is():
     """Perfect ones too."""
     windy = {"wind.north": 40.0, "wind.east": 30.0, "gust.w": 8.0, "duration": 0.3}
