@@ -23,6 +23,7 @@ from ahv_analysis.campaign.store import part_files, read_part
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.flight.case import load_case, make_case, read_case
 from ahv_analysis.report.map_figure import CONTOURS, draw_map
+from ahv_plant.numerics.compiling import told_of_compiling
 from test.test_command import told
 
 CASE = "neuro_adaptive_sc_gdi"
@@ -94,6 +95,14 @@ def test_what_was_flown_is_not_flown_again(flown):
     done = []
     assert fly_map(map_, out, Idle(), done.append) == points
     assert done[-1] == 4 * RUNS
+
+
+def test_points_with_other_values_compile_nothing(flown, tmp_path):
+    compiled = []
+    other = tiny("latency.delay=0:0.1:2", "actuator.elevons.bandwidth=5:50:2")
+    with ThreadPoolExecutor(2) as pool, told_of_compiling(compiled.append):
+        assert len(fly_map(other, tmp_path, pool)) == 4
+    assert not any(compiled)
 
 
 def test_an_interrupted_map_keeps_its_points_and_resumes(flown, tmp_path):
