@@ -43,6 +43,7 @@ from ahv_analysis.versions import what_computes
 from ahv_plant.dispersion import Dispersion, draw_dispersion, in_calm
 from ahv_plant.draws import Distributions, draw_values
 from ahv_plant.hardware.noise import NO_DRAWS
+from ahv_plant.hardware.wind import is_turbulent
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
@@ -127,7 +128,8 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     Runs that differ in more than lanes can differ in are flown one by one.
     """
     runs = range(first, first + count)
-    if campaign.draws is not None:
+    drawn_filters = campaign.random_starts and is_turbulent(campaign.case.plant.truth.wind)
+    if campaign.draws is not None or drawn_filters:  # those of turbulence go by the first speed
         rows = [fly_again(campaign, run) for run in runs]
         return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
     dispersions = np.array([campaign.dispersion(run) for run in runs])
