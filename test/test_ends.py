@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -41,7 +42,8 @@ def test_nodes_end_with_the_command_that_is_killed(tmp_path):
     command += ["--processes", "--duration", "1000", "--out", tmp_path, "--json"]
     program = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     try:
-        wait_until(lambda: any(file.stat().st_size > 1e5 for file in tmp_path.glob("bag/*.mcap")))
+        files = partial(tmp_path.glob, "bag/*.mcap")
+        wait_until(lambda: any(file.stat().st_size > 3e5 for file in files()))  # states among it
         started = descendants(program.pid)
         assert len(started) >= 6  # tracker and server, plant, recorder, two controllers at least
         os.kill(max(started), signal.SIGSTOP)
@@ -127,7 +129,8 @@ except typer.Exit:
 def test_an_interrupted_command_ends_though_the_middleware_hangs(tmp_path):
     command = [sys.executable, "-c", HANGS, "nominal_di", "--duration", "1000", "--realtime"]
     flown = subprocess.Popen([*command, "--out", tmp_path], stderr=subprocess.PIPE, text=True)
-    wait_until(lambda: any(file.stat().st_size > 1e5 for file in tmp_path.glob("bag/*.mcap")))
+    files = partial(tmp_path.glob, "bag/*.mcap")
+        wait_until(lambda: any(file.stat().st_size > 3e5 for file in files()))  # states among it
     flown.send_signal(signal.SIGINT)
     _, said = flown.communicate(timeout=PATIENCE)
     assert flown.returncode == 128 + signal.SIGINT
