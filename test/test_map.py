@@ -10,15 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 from PIL import Image
 
+from ahv_analysis.campaign.axis import places_of, read_axis, read_settings, with_value
 from ahv_analysis.campaign.campaign import Campaign, fly_runs
-from ahv_analysis.campaign.map import (
-    Map,
-    fly_map,
-    places_of,
-    read_axis,
-    read_settings,
-    with_value,
-)
+from ahv_analysis.campaign.map import Map, fly_map
 from ahv_analysis.campaign.store import part_files, read_part
 from ahv_analysis.errors import CampaignError
 from ahv_analysis.flight.case import load_case, make_case, read_case
@@ -180,7 +174,7 @@ def test_a_setting_has_the_type_of_its_parameter():
         ((X, "k_ao_?=0:1"), ("k_ao_?", "docs/parameters.md")),
         ((X, "level=0.4:0.2"), ("level", "LOW is 0.4", "below HIGH, 0.2")),
         ((X, "level=0.2:0.4:1"), ("level", "COUNT is 1", "2 or more")),
-        ((X, "level=0.2:0.4:x"), ("level=0.2:0.4:x", "integer")),
+        ((X, "level=0.2:0.4:x"), ("level", "0.2:0.4:x", "integer")),
         ((X, "level"), ("'level'", "NAME=LOW:HIGH")),
         ((X, "level=0:2"), ("level is 2.0", "0 to 0.9")),
         (("latency.delay=0:9", Y), ("latency.delay is 9.0", "0 to")),

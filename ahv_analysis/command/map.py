@@ -22,11 +22,13 @@ from ahv_analysis.command.console import (
     progress_bar,
 )
 from ahv_analysis.interrupt import interrupted_says, signals_wait
+from ahv_analysis.ranges import RANGE
 
 if TYPE_CHECKING:  # it takes long to load
-    from ahv_analysis.campaign.map import Given, Map, Point
+    from ahv_analysis.campaign.condition import Given
+    from ahv_analysis.campaign.map import Map, Point
 
-AXIS = "NAME=LOW:HIGH[:COUNT]"
+AXIS = f"NAME={RANGE}"
 
 
 def map_rates(
@@ -36,7 +38,8 @@ def map_rates(
         typer.Option(
             "--x",
             metavar=AXIS,
-            help="Horizontal axis: a parameter, a pattern of several, or level.",
+            help="Horizontal axis: a parameter, a pattern of several, level, or altitude, mach, "
+            "mass: where start and commands are, as in altitude=22:32km or mass=80,110,140t.",
         ),
     ],
     y: Annotated[str, typer.Option("--y", metavar=AXIS, help="Vertical axis.")],
@@ -59,22 +62,14 @@ def map_rates(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Fly the success rate over any two parameters, as a heat map.
+    """Fly the success rate over any two parameters or flight conditions, as a heat map.
 
     Every point is a campaign of the same vehicles, kept in the folder with map.png, map.parquet
-    and map.json. NAME is a parameter of any node, a shell pattern for several, or level.
+    and map.json. NAME is a parameter of any node, a shell pattern for several, level, or a flight
+    condition: altitude, mach, mass. Where that has no trim, nothing is flown.
     """
-    from ahv_analysis.campaign.map import (
-        LEVEL,
-        Map,
-        fly_map,
-        rates,
-        read_axis,
-        read_settings,
-        set_apart,
-        with_value,
-        write_map,
-    )
+    from ahv_analysis.campaign.axis import LEVEL, read_axis, read_settings, set_apart, with_value
+    from ahv_analysis.campaign.map import Map, fly_map, rates, write_map
     from ahv_analysis.flight.case import read_case
     from ahv_analysis.report.map_figure import draw_map, save_map
 
@@ -112,6 +107,9 @@ def map_rates(
         "runs": runs,
         "x": {"name": axes[0].name, "unit": axes[0].unit, "values": axes[0].values},
         "y": {"name": axes[1].name, "unit": axes[1].unit, "values": axes[1].values},
+        "without_trim": [
+            {"x": x, "y": y, "why": why} for (x, y), why in flown.without_trim.items()
+        ],
     }
     write_map(folder, points, described)
     title = assumptions(described)
@@ -122,6 +120,9 @@ def map_rates(
         print_json({**described, "points": rows, "wall_s": wall, "out": str(folder)})
     else:
         print(f"{title}\n\n{rate_table(flown, points)}\n")
+        if flown.without_trim:
+            reasons = ", ".join(dict.fromkeys(flown.without_trim.values()))
+            print(f"-: not flown, for there is no trim: {reasons}")
         print(f"{total} flights in {wall:.0f} s; kept in {folder}")
 
 
@@ -139,8 +140,12 @@ def assumptions(described: dict[str, Any]) -> str:
 def rate_table(flown: "Map", points: "list[Point]") -> str:
     """Success rates in percent as they lie on the map: y upwards, x to the right."""
     rate = {(point.x, point.y): f"{100.0 * point.success_rate:.1f}" for point in points}
-    rows = [[f"{y:g}", *(rate[x, y] for x in flown.x.values)] for y in reversed(flown.y.values)]
-    rows.append(["", *(f"{x:g}" for x in flown.x.values)])
+    xs, ys = flown.x.written.written, flown.y.written.written
+    rows = [
+        [f"{written:g}", *(rate.get((x, y), "-") for x in flown.x.values)]
+        for y, written in zip(reversed(flown.y.values), reversed(ys), strict=True)
+    ]
+    rows.append(["", *(f"{x:g}" for x in xs)])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
