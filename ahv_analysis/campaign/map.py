@@ -87,6 +87,7 @@ class Point(NamedTuple):
     interval_low: float  # [-] exact, of 95 %
     interval_high: float
     beyond_saving: int  # vehicles that pass 5 deg whatever is commanded
+    with_trim: int  # vehicles that have a trim within the limits, alpha within 5 deg
 
 
 def fly_map(
@@ -135,8 +136,11 @@ def fly_map(
 
 def _point(point: tuple[float, float], summary: Mapping[str, Any]) -> Point:
     runs, successes = summary["runs"], summary["successes"]
-    interval, beyond_saving = summary["interval"], summary["beyond_saving"]
-    return Point(*point, runs, successes, summary["success_rate"], *interval, beyond_saving)
+    interval, bounds = (
+        summary["interval"],
+        (summary["beyond_saving"], summary["trim_within_5_deg"]),
+    )
+    return Point(*point, runs, successes, summary["success_rate"], *interval, *bounds)
 
 
 def write_map(out: Path, points: Sequence[Point], described: Mapping[str, Any]) -> None:

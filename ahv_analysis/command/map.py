@@ -62,7 +62,7 @@ def map_rates(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Fly the success rate over any two parameters or flight conditions, as a heat map.
+    """Fly the success rate over any two parameters, as a heat map.
 
     Every point is a campaign of the same vehicles, kept in the folder with map.png, map.parquet
     and map.json. NAME is a parameter of any node, a shell pattern for several, level, or a flight

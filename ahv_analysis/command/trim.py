@@ -2,6 +2,8 @@
 """The command `ahv trim`."""
 
 import sys
+from math import nan
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,10 +11,13 @@ import typer
 from ahv_analysis.command.console import (
     Json,
     UsageError,
-    number_option,
     print_json,
     show_table,
 )
+from ahv_analysis.command.envelope import ALTITUDES, MACHS, MASSES, make_envelope
+from ahv_analysis.ranges import RANGE, read_number
+from ahv_plant.envelope import NOT_FOUND
+from ahv_plant.model.atmosphere import atmosphere
 from ahv_plant.model.constants import (
     DEGREES,
     INITIAL_MASS,
@@ -27,15 +32,80 @@ DECIMALS = 9  # of what is printed
 
 
 def trim(
-    altitude: Annotated[float, number_option("m", "Altitude")] = CRUISE_ALTITUDE,
-    speed: Annotated[float, number_option("m/s", "Forward speed u")] = CRUISE_SPEED,
-    mass: Annotated[float, number_option("kg", "Mass")] = INITIAL_MASS,
+    altitude: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER",
+            help=f"Altitude [m], or in km; by default {CRUISE_ALTITUDE:g}, of a map {ALTITUDES}.",
+        ),
+    ] = None,
+    speed: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER", help=f"Forward speed u [m/s], by default {CRUISE_SPEED:g}."
+        ),
+    ] = None,
+    mach: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER", help=f"Instead: Mach number of u; of a map by default {MACHS}."
+        ),
+    ] = None,
+    mass: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER",
+            help=f"Mass [kg], or in t; by default {INITIAL_MASS:g}, of a map {MASSES}.",
+        ),
+    ] = None,
     geometric: Annotated[
         bool, typer.Option("--geometric", help="The altitude is geometric, not geopotential.")
     ] = False,
+    mapped: Annotated[
+        bool,
+        typer.Option(
+            "--map",
+            help="Trims over altitude, Mach number and mass, and the limits where there is none; "
+            f"each is {RANGE} or A,B,C.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the map, by default maps/trim.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Find level flight: section 3.5.1 of the report."""
+    """Find level flight: section 3.5.1 of the report.
+
+    With --map, find all of its envelope, and keep it as trim.png, trim.parquet and trim.json.
+    """
+    if mapped:
+        if speed is not None:
+            raise UsageError("--speed is for one trim; a map has --mach")
+        if make_envelope(altitude, mach, mass, geometric, out, as_json) == 0:
+            print("ahv: no point has a trim within the limits", file=sys.stderr)
+            raise typer.Exit(1)
+        return
+    if out is not None:
+        raise UsageError("--out is for a map: --map")
+    if speed is not None and mach is not None:
+        raise UsageError("--speed and --mach both set the speed")
+    h = _one("--altitude", altitude, "m", CRUISE_ALTITUDE)
+    u = _one("--speed", speed, "m/s", CRUISE_SPEED)
+    if mach is not None:
+        u = _one("--mach", mach, "", nan) * atmosphere(h, geometric).sound_speed
+    _trim_once(h, u, _one("--mass", mass, "kg", INITIAL_MASS), geometric, as_json)
+
+
+def _one(name: str, text: str | None, unit: str, default: float) -> float:
+    """Number that an option gives, in its unit."""
+    if text is None:
+        return default
+    if ":" in text or "," in text:
+        raise UsageError(f"{name} is {text!r}, but must be one number without --map")
+    return read_number(name, text, unit)
+
+
+def _trim_once(altitude: float, speed: float, mass: float, geometric: bool, as_json: bool) -> None:
     from ahv_plant.dispersion import Truth
     from ahv_plant.trim import trim as solve
 
@@ -70,7 +140,7 @@ def trim(
         ]
         show_table(f"Trim at {altitude:g} m, {speed:g} m/s, {mass:g} kg", rows)
     if not found.converged:
-        print("ahv: no trim was found: the solver did not converge", file=sys.stderr)
+        print(f"ahv: no trim was found: {NOT_FOUND}", file=sys.stderr)
     elif not found.within_limits:
         print(f"ahv: the trim is out of reach: {_beyond(found)}", file=sys.stderr)
     if not (found.converged and found.within_limits):
