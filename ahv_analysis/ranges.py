@@ -10,6 +10,7 @@ import numpy as np
 from ahv_msgs_py.parameters import ParameterError
 
 RANGE = "LOW:HIGH[:COUNT]"
+MOST = 1000  # values of a range
 LARGER = {"m": {"km": 1000.0}, "kg": {"t": 1000.0}}  # units that are written for these
 
 
@@ -63,6 +64,8 @@ def read_values(name: str, text: str, own: str, count: int, least: int = 2) -> V
         raise ParameterError(f"{name}: LOW is {low}, but must be below HIGH, {high}")
     if ranged and count < 2:
         raise ParameterError(f"{name}: COUNT is {count}, but must be 2 or more")
+    if ranged and count > MOST:
+        raise ParameterError(f"{name}: COUNT is {count}, but must be {MOST} or less")
     if not ranged and any(one >= other for one, other in pairwise(numbers)):
         raise ParameterError(f"{name}: {text!r} must be in order, from low to high")
     if ranged:

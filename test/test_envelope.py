@@ -164,6 +164,13 @@ def test_a_map_without_a_trim_says_so(tmp_path):
     assert (tmp_path / "trim.png").exists()
 
 
+def test_a_single_trim_says_where_the_inlet_would_unstart():
+    result = told("trim", "--altitude", "30km")
+    assert result.returncode == 0
+    assert result.stderr == "ahv: the inlet unstarts there: alpha 8.055 deg (-5 to 5)\n"
+    assert told("trim").stderr == ""
+
+
 @pytest.mark.unit
 @pytest.mark.parametrize("text, value", [("24000", 24e3), ("24000m", 24e3), ("24.3km", 24.3e3)])
 def test_a_number_may_have_its_unit(text, value):
@@ -192,6 +199,11 @@ def test_what_is_no_number_is_refused(text):
         (("--map", "--altitude", "34:20km"), ("--altitude", "LOW is 34")),
         (("--map", "--mach", "3:10"), ("--mach is 3", "4 to 24")),
         (("--map", "--mach", "4:10:1"), ("--mach", "COUNT is 1")),
+        (("--map", "--mach", "4:10:100000000"), ("--mach", "COUNT is 100000000", "1000 or less")),
+        (
+            ("--map", "--mach", "4:10:1000", "--altitude", "20:34km:90"),
+            ("270000 points", "200000"),
+        ),
         (("--map", "--mach", "4:nan"), ("--mach", "finite")),
         (("--map", "--out", "/dev/null/x"), ("/dev/null/x", "cannot hold a map")),
         (("--map", "--mass", "50,80t"), ("mass 50000 kg", "60000 to 140000 kg")),

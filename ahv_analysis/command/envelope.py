@@ -18,6 +18,7 @@ from ahv_plant.trim import MACH_MAXIMUM, check_flight_condition
 ALTITUDES, MACHS, MASSES = "20:34km", "4:10", "80,110,140t"
 ROWS, COLUMNS = 15, 25  # altitudes and Mach numbers of a range that has no COUNT
 MOST_MASSES = 6  # that a picture has room for
+MOST_POINTS = 200_000  # some 10 s
 
 
 def make_envelope(
@@ -83,6 +84,9 @@ def _check(altitudes: Values, machs: Values, masses: Values, geometric: bool) ->
         raise UsageError(
             f"--mass has {len(masses.numbers)} values, but a picture has room for {MOST_MASSES}"
         )
+    count = len(altitudes.numbers) * len(machs.numbers) * len(masses.numbers)
+    if count > MOST_POINTS:
+        raise UsageError(f"the map has {count} points, but must have {MOST_POINTS} or less")
     for height, mass in product(altitudes.numbers, masses.numbers):
         speed = machs.numbers[0] * atmosphere(height, geometric).sound_speed
         try:

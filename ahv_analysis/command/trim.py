@@ -16,7 +16,7 @@ from ahv_analysis.command.console import (
 )
 from ahv_analysis.command.envelope import ALTITUDES, MACHS, MASSES, make_envelope
 from ahv_analysis.ranges import RANGE, read_number
-from ahv_plant.envelope import NOT_FOUND
+from ahv_plant.envelope import ALPHA, NOT_FOUND
 from ahv_plant.model.atmosphere import atmosphere
 from ahv_plant.model.constants import (
     DEGREES,
@@ -143,6 +143,12 @@ def _trim_once(altitude: float, speed: float, mass: float, geometric: bool, as_j
         print(f"ahv: no trim was found: {NOT_FOUND}", file=sys.stderr)
     elif not found.within_limits:
         print(f"ahv: the trim is out of reach: {_beyond(found)}", file=sys.stderr)
+    elif ALPHA.margin(found.alpha * DEGREES) < 0.0:
+        print(
+            f"ahv: the inlet unstarts there: alpha {found.alpha * DEGREES:.3f} deg "
+            f"({ALPHA.low:g} to {ALPHA.high:g})",
+            file=sys.stderr,
+        )
     if not (found.converged and found.within_limits):
         raise typer.Exit(1)
 
