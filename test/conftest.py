@@ -13,9 +13,15 @@ from ahv_msgs_py.node.network import keep_to_this_machine
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 keep_to_this_machine()
 if find_spec("hypothesis"):
-    from hypothesis import settings
+    from hypothesis import HealthCheck, settings
 
-    settings.register_profile("ahv", deadline=None, derandomize=True, print_blob=False)
+    settings.register_profile(
+        "ahv",
+        deadline=None,
+        derandomize=True,
+        print_blob=False,
+        suppress_health_check=[HealthCheck.too_slow],  # it goes by the clock of a busy machine
+    )
     settings.load_profile("ahv")
 
 # Packages that only tests need and rosdep may not bring: what imports one that is absent is
@@ -55,7 +61,18 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.graph)
 
 
-@pytest.fixture
-def domain():
+def unused_domain():
     """A ROS domain that no other test of this run uses (above 101 ports are not safe)."""
     return 1 + (2 * next(_domains) + WORKER) % 98
+
+
+@pytest.fixture
+def domain():
+    """The ROS domain of a test."""
+    return unused_domain()
+
+
+@pytest.fixture
+def other_domain():
+    """And one for what it has beside that: the next number is the other process's."""
+    return unused_domain()

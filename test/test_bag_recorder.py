@@ -5,7 +5,6 @@ import os
 import random
 import resource
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
@@ -30,17 +29,9 @@ from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, STATE
 from test.bags import mcap_of
 from test.kill_recorder import RECORDER, kill_recorders
+from test.waiting import wait_until
 
 SMALL = 600_000  # [bytes] a disk that takes a few chunks, and what DDS wants of memory
-PATIENCE = 20.0  # [s] for something that comes in a fraction of a second
-
-
-def wait_for(condition):
-    """Wait until `condition()` holds; it holds soon, on a machine of any speed."""
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def messages_in(file):
@@ -74,10 +65,13 @@ def test_a_message_is_on_disk_soon_though_nothing_follows_it(tmp_path, domain):
         ]
 
     sender.publish(clock_bytes(10))
-    wait_for(lambda: clocks_on_disk(10))
+    wait_until(lambda: clocks_on_disk(10), "the first message is on disk")
     sender.publish(clock_bytes(20))
     sender.publish(clock_bytes(30))
-    wait_for(lambda: clocks_on_disk(10, 20, 30) and recorder.now == 30)  # of its diagnostics
+    wait_until(
+        lambda: clocks_on_disk(10, 20, 30) and recorder.now == 30,  # of its diagnostics
+        "all messages are on disk",
+    )
     executor.remove_node(recorder)
     executor.shutdown()
     recorder.destroy_node()

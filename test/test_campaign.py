@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 import tracemalloc
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -48,6 +47,7 @@ from ahv_analysis.report.page_figures import campaign_figures
 from ahv_msgs_py.config import config_folder
 from ahv_plant.numerics.identity import HOUSE
 from test.test_command import ahv, told
+from test.waiting import PATIENCE, wait_until
 
 RUNS = 150
 AHV = Path(sys.executable).parent / "ahv"
@@ -592,11 +592,9 @@ def test_ctrl_c_keeps_what_was_flown(tmp_path):
     command = (*heard, AHV, "monte-carlo", "--controller", case)
     command = (*command, "--runs", "9000000", "--out", out)
     process = subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
-    while not part_files(out / "runs-0.3") and time.monotonic() < deadline:
-        time.sleep(0.1)
+    wait_until(lambda: part_files(out / "runs-0.3"), "a part of the campaign is on disk")
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert "resumes" in errors and "Traceback" not in errors
     kept = int(re.search(r"after (\d+) of 9000000", errors)[1])

@@ -16,17 +16,18 @@ from ahv_analysis.command.app import app
 from ahv_analysis.flight.case import case_names
 from ahv_msgs_py.node.faults import fault_rows
 from ahv_plant.model.vectors import State
+from test.waiting import PATIENCE
 
 
-def ahv(*arguments, domain=100, cwd=None, **environment):
-    """Run the command as a process of its own."""
+def ahv(*arguments, cwd=None, **environment):
+    """Run the command as a process of its own, in the ROS domain of this one."""
     return subprocess.run(
         [Path(sys.executable).parent / "ahv", *map(str, arguments)],
         capture_output=True,
         text=True,
         cwd=cwd,
-        env=os.environ | {"ROS_DOMAIN_ID": str(domain)} | environment,
-        timeout=120,
+        env=os.environ | environment,
+        timeout=PATIENCE,
     )
 
 
@@ -112,7 +113,7 @@ def test_output_that_nobody_reads_ends_in_silence(arguments):
     reader, writer = os.pipe()
     os.close(reader)
     command = [Path(sys.executable).parent / "ahv", *arguments]
-    result = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=60)
+    result = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=PATIENCE)
     os.close(writer)
     assert (result.returncode, result.stderr) == (141, b"")
 
@@ -120,7 +121,7 @@ def test_output_that_nobody_reads_ends_in_silence(arguments):
 def test_a_full_disk_is_named():
     with open("/dev/full", "w") as full:
         command = [Path(sys.executable).parent / "ahv", "trim", "--json"]
-        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, timeout=60)
+        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, timeout=PATIENCE)
     assert result.returncode == 2
     assert result.stderr.startswith(b"ahv: ") and result.stderr.count(b"\n") == 1
 
@@ -174,7 +175,7 @@ def test_a_name_is_never_markup_and_no_output_fails_for_its_characters(tmp_path)
         text=True,
         cwd=tmp_path,
         env=os.environ | odd,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert result.returncode == 0, result.stderr
     assert "Traceback" not in result.stderr
@@ -307,7 +308,7 @@ def test_a_flight_that_ends_early_says_so_by_its_exit_code(tmp_path):
 
 
 def test_a_domain_that_ros_refuses_is_named(tmp_path):
-    result = ahv("fly", "nominal_di", domain="abc", cwd=tmp_path)
+    result = ahv("fly", "nominal_di", cwd=tmp_path, ROS_DOMAIN_ID="abc")
     assert result.returncode == 2
     assert result.stdout == "" and "ROS_DOMAIN_ID is 'abc'" in result.stderr
 

@@ -2,6 +2,7 @@
 """Bad messages, ten thousand to every subscription of every node: none obeyed, all counted."""
 
 import math
+from functools import partial
 
 import pytest
 import rclpy
@@ -22,6 +23,7 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
 )
+from test.waiting import wait_until
 
 EXAMPLES, BATCH = 100, 100
 SUBSCRIPTIONS = [
@@ -121,8 +123,8 @@ class Fuzzed:
         self.executor = EventsExecutor(context=self.context)
         for node in (self.node, self.sender):
             self.executor.add_node(node)
-        while not self.publisher.get_subscription_count():
-            self.executor.spin_once(0.01)
+        look = partial(self.executor.spin_once, 0.01)
+        wait_until(self.publisher.get_subscription_count, f"{name} hears {topic.name}", look)
         self.sent = 0
         if name == "plant":  # as if it had flown that far
             self.node._flying, self.node.step = True, 5000
@@ -134,10 +136,11 @@ class Fuzzed:
         before = self.refused()
         for data in batch:
             self.publisher.publish(data)
-        for _ in range(20 * len(batch)):
-            if self.refused() - before >= len(batch):
-                break
-            self.executor.spin_once(0.05)
+        wait_until(
+            lambda: self.refused() - before >= len(batch),
+            f"{len(batch)} messages are refused",
+            partial(self.executor.spin_once, 0.05),
+        )
         self.sent += len(batch)
         return self.refused() - before
 

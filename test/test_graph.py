@@ -169,16 +169,16 @@ def test_a_graph_leaves_nothing_behind(tmp_path, domain):
     assert not rclpy.ok()  # the default context was never touched
 
 
-def test_two_graphs_of_one_process_do_not_meet(tmp_path, domain):
+def test_two_graphs_of_one_process_do_not_meet(tmp_path, domain, other_domain):
     cases = [
         load_case("nominal_di", {"duration": 0.5}),
         load_case("nominal_di", {"duration": 0.7}),
     ]
     flights = [
         threading.Thread(
-            target=fly_graph, args=(case, tmp_path / str(n)), kwargs={"domain": domain + n}
+            target=fly_graph, args=(case, tmp_path / str(n)), kwargs={"domain": its_domain}
         )
-        for n, case in enumerate(cases)
+        for n, (case, its_domain) in enumerate(zip(cases, (domain, other_domain), strict=True))
     ]
     for flight in flights:
         flight.start()

@@ -27,6 +27,7 @@ from ahv_analysis.flight.library import fly_library
 from ahv_analysis.report.page_flight import read_flights
 from ahv_msgs_py.parameters import ParameterError
 from test.bags import mcap_of, stock
+from test.waiting import PATIENCE
 
 ODD = [
     None,
@@ -310,7 +311,7 @@ def test_what_unpacks_without_end_and_what_never_ends_take_no_memory(tmp_path, s
         [sys.executable, "-c", READ_ALL, *map(str, bags)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert done.returncode == 0, done.stderr
     sentences = done.stdout.splitlines()

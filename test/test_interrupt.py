@@ -10,6 +10,7 @@ import pytest
 
 from ahv_analysis.interrupt import signals_wait
 from test.interrupt import AHV, WAYS, fault, interrupted, try_moments
+from test.waiting import PATIENCE
 
 
 @pytest.mark.parametrize("ways", WAYS[:4], ids=" ".join)
@@ -41,7 +42,7 @@ def program(lines, number=signal.SIGINT):
         [sys.executable, "-c", f"{head}number = {int(number)}\n{lines}"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
 
 

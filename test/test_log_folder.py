@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from test.waiting import PATIENCE
+
 
 def node(*arguments, **environment):
     """Run a node as a process, with another environment."""
@@ -14,8 +16,8 @@ def node(*arguments, **environment):
         [sys.executable, "-c", PROGRAM, *arguments],
         capture_output=True,
         text=True,
-        env={"PATH": os.environ["PATH"], "ROS_DOMAIN_ID": "101", **environment},
-        timeout=60,
+        env={name: os.environ[name] for name in ("PATH", "ROS_DOMAIN_ID")} | environment,
+        timeout=PATIENCE,
     )
 
 

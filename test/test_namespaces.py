@@ -23,6 +23,7 @@ from ahv_msgs_py.topics import (
 )
 from test.test_command import ahv as command
 from test.test_replay import ahv  # noqa: F401  the command in this process
+from test.waiting import PATIENCE
 
 CASES = {"/uav1": "nominal_di", "/fleet/uav2": "neuro_adaptive_di"}
 
@@ -48,7 +49,7 @@ def bags(tmp_path_factory):
         process.start()
         flights[namespace] = (process, bag)
     for process, _ in flights.values():
-        process.join(180)  # compiles first, where nobody has
+        process.join(PATIENCE)  # compiles first, where nobody has
         assert process.exitcode == 0
     return {namespace: bag for namespace, (_, bag) in flights.items()}
 
@@ -125,9 +126,9 @@ def test_names_within_a_namespace():
 
 
 @pytest.mark.parametrize("way", [(), ("--processes",)])
-def test_the_command_flies_in_a_namespace(way, tmp_path):
+def test_the_command_flies_in_a_namespace(way, tmp_path, domain):
     flight = ("fly", "nominal_di", "--duration", 5, "--namespace", "fleet/uav1", *way)
-    flown = command(*flight, "--out", tmp_path, domain=101)
+    flown = command(*flight, "--out", tmp_path, ROS_DOMAIN_ID=str(domain))
     assert flown.returncode == 0, flown.stderr
     bag = read(tmp_path / "bag")
     assert bag.namespace == "/fleet/uav1"

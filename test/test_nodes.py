@@ -21,6 +21,7 @@ from ahv_msgs_py.node.quality import SENDER_DEPTH
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, DIAGNOSTICS, LOOP_TOPICS, ODOMETRY, STATE
+from test.waiting import PATIENCE, wait_until
 
 CASE = load_case("neuro_adaptive_di", {"duration": 20.0})
 
@@ -57,10 +58,11 @@ class Graph:
 
     def ask(self, service_type, service, request):
         client = self.client.create_client(service_type, service)
-        while not client.service_is_ready():
-            self.executor.spin_once(0.01)
+        look = partial(self.executor.spin_once, 0.01)
+        wait_until(client.service_is_ready, f"{service} is known", look)
         answer = client.call_async(request)
-        self.executor.spin_until_future_complete(answer, 5.0)
+        self.executor.spin_until_future_complete(answer, PATIENCE)
+        assert answer.done(), f"{service} has not answered for {PATIENCE:g} s"
         return answer.result()
 
     def change(self, name, transition):
@@ -160,7 +162,7 @@ def test_an_inactive_node_does_not_answer(graph):
     assert not any(flown.heard.values())
     for node in flown.nodes.values():
         node.trigger_activate()
-    flown.executor.spin_until_future_complete(flown.nodes["plant"].finished, 20.0)
+    flown.executor.spin_until_future_complete(flown.nodes["plant"].finished, PATIENCE)
     assert flown.nodes["plant"].step == 2000
 
 

@@ -118,7 +118,7 @@ def test_wheel_carries_what_ros_looks_for(setup, sources, tmp_path):
     expected += ["ahv/launch/flight.launch.py", "ahv/launch/replay.launch.py"]
     assert {f"{data}/share/{name}" for name in expected} <= set(modes)
     code = [path for path in ROOT.glob("ahv_*/**/*") if path.is_file()]
-    ours = {str(path.relative_to(ROOT)) for path in code if path.suffix != ".pyc"}
+    ours = {str(path.relative_to(ROOT)) for path in code if path.parent.name != "__pycache__"}
     assert ours <= set(modes)
     assert not [name for name in modes if name.startswith(("test", "studies"))]
 

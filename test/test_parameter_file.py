@@ -10,6 +10,7 @@ import pytest
 from ahv_msgs_py.parameter_file import given_files, read_parameter_file, shared_names
 from ahv_msgs_py.parameters import ParameterError
 from test.test_command import ahv
+from test.waiting import PATIENCE
 
 NODE = "/ahv/velocity"
 AHEAD = f"{NODE}:\n  ros__parameters:\n"
@@ -148,7 +149,7 @@ def test_a_node_and_the_command_refuse_the_same_file_in_the_same_words(tmp_path)
         [sys.executable, "-c", NODE_PROGRAM, "--ros-args", "--params-file", path],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     command = ahv("fly", path)
     assert node.returncode == command.returncode == 2
@@ -177,7 +178,7 @@ def test_a_node_ignores_what_is_for_all_and_refuses_what_is_misspelt_for_it(tmp_
         [sys.executable, "-c", NODE_PROGRAM, "--ros-args", "--params-file", path],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     ignored, refused = node.stderr.splitlines()
     assert ignored.startswith("[WARN]")

@@ -5,8 +5,8 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
+from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
 from textwrap import wrap
@@ -41,6 +41,7 @@ from ahv_msgs_py.topics import STATE, SURFACE_COMMAND
 from ahv_plant.model.constants import DEGREES, STEP_NS
 from test.ends import beside
 from test.ends import fly as fly_by_command
+from test.waiting import wait_until
 
 CASE = "neuro_adaptive_sc_gdi"
 DDS = "{http://www.eprosima.com}"  # namespace of Fast DDS's profiles
@@ -107,9 +108,11 @@ def watched(name, until, realtime=True):
         case = load_case(name, {"duration": 3600.0})
         graph = ProcessGraph(case, None, realtime, spectators=1)
         with spectator.looking_on(), graph:
-            deadline = time.monotonic() + 30.0
-            while spectator.stamp < until * STEP_NS and time.monotonic() < deadline:
-                spectator.look(0.1)
+            wait_until(
+                lambda: spectator.stamp >= until * STEP_NS,
+                f"the flight is at step {until}",
+                partial(spectator.look, 0.1),
+            )
             yield graph, spectator
             graph.end_flight()
     finally:
@@ -212,10 +215,15 @@ def test_in_real_time_nobody_waits_for_what_is_lost():
     """
     with watched("nominal_di", 1) as (graph, spectator):
         profile = Path(os.environ[PROFILES])  # of this process and of all that it starts
-        hears = {
-            listener.node_name: listener.qos_profile.reliability
-            for listener in spectator._node.get_subscriptions_info_by_topic(STATE.name)
-        }
+        hears = {}
+
+        def all_are_known():  # to the spectator: it hears of each by itself, and in any order
+            for listener in spectator._node.get_subscriptions_info_by_topic(STATE.name):
+                hears[listener.node_name] = listener.qos_profile.reliability
+            return hears.keys() >= {*graph.controllers}
+
+        look = partial(spectator.look, 0.1)
+        wait_until(all_are_known, "every controller is seen to hear the state", look)
     assert {hears[name] for name in graph.controllers} == {ReliabilityPolicy.BEST_EFFORT}
     (writer,) = ElementTree.parse(profile).iter(f"{DDS}data_writer")
     assert writer.get("is_default_profile") == "true"

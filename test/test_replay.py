@@ -289,7 +289,7 @@ def test_a_node_that_falls_silent_is_missing_its_commands(ahv, bags, monkeypatch
 
 
 def test_a_node_that_stops_is_reported(bags, monkeypatch):
-    monkeypatch.setattr("ahv_analysis.replay.replay.LONGEST_SILENCE", 0.3)
+    monkeypatch.setattr("ahv_analysis.replay.replay.LONGEST_SILENCE", 2.0)
     monkeypatch.setattr("ahv_control.velocity_node.VelocityNode._answer", lambda *arguments: None)
     with pytest.raises(GraphError, match="100 commands up to 1 s have not come"):
         again(bags / "nominal_di", load_case("nominal_di"))

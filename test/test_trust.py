@@ -2,6 +2,7 @@
 """Whom the graph believes: not who speaks last, nor who has the name, but who was heard first."""
 
 from contextlib import contextmanager
+from functools import partial
 
 import pytest
 import rclpy
@@ -25,6 +26,7 @@ from ahv_msgs_py.topics import (
     SURFACE_COMMAND,
 )
 from ahv_plant.plant_node import PlantNode
+from test.waiting import wait_until
 
 
 @contextmanager
@@ -52,8 +54,7 @@ def test_every_message_comes_with_the_gid_of_its_publisher(executor_class, domai
         sent = [RATE_COMMAND.layout.encode(0, (float(number), 0.0, 0.0)) for number in range(2)]
         for publisher, data in zip(publishers, sent, strict=True):
             publisher.publish(data)
-        while len(heard) < len(sent):
-            executor.spin_once(0.1)
+        spin(executor, lambda: len(heard) == len(sent), "both messages have come")
         assert [data for data, _ in heard] == sent
         assert {gid for _, gid in heard} == {*gids(node, "/rates")}
         listener.close()
@@ -70,11 +71,15 @@ def test_a_plant_with_two_publishers_of_a_command_refuses_to_fly(domain):
         message_type = message_class(SURFACE_COMMAND.layout.type_name)
         for _ in range(2):
             node.create_publisher(message_type, SURFACE_COMMAND.name, quality(True))
-        assert spin(executor, lambda: plant.count_publishers(SURFACE_COMMAND.name) == 2)
+        spin(
+            executor,
+            lambda: plant.count_publishers(SURFACE_COMMAND.name) == 2,
+            "the plant knows both publishers",
+        )
         node.create_subscription(
             message_class(STATE.layout.type_name), STATE.name, print, quality(True)
         )
-        assert spin(executor, plant.finished.done)
+        spin(executor, plant.finished.done, "the plant has ended")
         says = "refused to fly: /ahv/surface_command has 2 publishers: end all but one of them"
         assert plant.finished.result() == says
         executor.remove_node(plant)
@@ -105,48 +110,51 @@ def recorder(tmp_path, domain):
         made.destroy_node()
 
 
-def spin(executor, condition):
-    for _ in range(200):
-        if condition():
-            return True
-        executor.spin_once(0.02)
-    return False
+def spin(executor, condition, what):
+    wait_until(condition, what, partial(executor.spin_once, 0.02))
 
 
 def test_nobody_but_the_plant_ends_a_recording(recorder):
     made, executor, plant, liar, node = recorder
-    assert spin(executor, lambda: made._bag.counts[STATE.name] and made._bag.counts[FLIGHT.name])
+    filed = made._bag.counts
+    spin(executor, lambda: filed[STATE.name] and filed[FLIGHT.name], "both are filed")
     slander = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, quality(True))
     for name in ("/factory/plant", "/ahv/plant"):
         status = DiagnosticStatus(name=name, values=[KeyValue(key="over", value="True")])
         slander.publish(DiagnosticArray(status=[status]))
     liar.publish(FLIGHT.layout.encode(20_000_000, (5.0, 1.0, FLOWN)))
-    assert spin(executor, lambda: made.health.total[Fault.SECOND_PUBLISHER])
+    spin(executor, lambda: made.health.total[Fault.SECOND_PUBLISHER], "the lie is counted")
     assert made._steps is None and not made.finished.done()
     plant.publish(FLIGHT.layout.encode(10_000_000, (0.0, 0.0, FLOWN)))
-    assert spin(executor, lambda: made._steps == 0)
+    spin(executor, lambda: made._steps == 0, "the end is known")
 
 
 def test_what_is_sent_again_after_a_pause_is_filed_once(recorder, tmp_path):
     """Latched topics are sent again to who starts to listen again; what came meanwhile as well."""
-    made, executor, plant, _, _ = recorder
-    plant.publish(FLIGHT.layout.encode(0, (5.0, 0.0, FLYING)))
-    assert spin(executor, lambda: made._bag.counts[FLIGHT.name] == 2)  # the liar's is one
+    made, executor, plant, liar, _ = recorder
+    first, meanwhile, last, of_liar = (
+        FLIGHT.layout.encode(10_000_000 * step, (5.0, float(step), FLYING)) for step in range(4)
+    )
+    plant.publish(first)
+    spin(executor, lambda: made._bag.counts[FLIGHT.name] == 2, "it is filed, and the liar's one")
     made.trigger_deactivate()
-    plant.publish(FLIGHT.layout.encode(10_000_000, (5.0, 1.0, FLYING)))
+    plant.publish(meanwhile)
     made.trigger_activate()
-    assert spin(executor, lambda: made._bag.counts[FLIGHT.name] == 3)
-    spin(executor, lambda: False)
+    plant.publish(last)  # behind all that is sent again by the same
+    liar.publish(of_liar)
+    spin(executor, lambda: made._bag.counts[FLIGHT.name] >= 5, "as many as were sent are filed")
     made.conclude()
-    assert len(load_bag(tmp_path / "bag")[FLIGHT.name].messages) == 3
+    lie = FLIGHT.layout.encode(10_000_000, (5.0, 1.0, FLOWN))
+    filed = load_bag(tmp_path / "bag")[FLIGHT.name].messages
+    assert sorted(filed) == sorted([lie, first, meanwhile, last, of_liar])
 
 
 def test_a_bag_that_is_deleted_in_flight_is_missed_at_once(recorder, tmp_path):
     made, executor, plant, _, _ = recorder
-    assert spin(executor, lambda: made._bag.counts[STATE.name])
+    spin(executor, lambda: made._bag.counts[STATE.name], "a state is filed")
     (tmp_path / "bag").rename(tmp_path / "elsewhere")
     plant.publish(FLIGHT.layout.encode(10_000_000, (5.0, 1.0, FLYING)))
-    assert spin(executor, lambda: made.failure or made._bag.failure)
+    spin(executor, lambda: made.failure or made._bag.failure, "the loss is noticed")
     plant.publish(FLIGHT.layout.encode(20_000_000, (5.0, 2.0, FLYING)))
-    assert spin(executor, made.finished.done)
+    spin(executor, made.finished.done, "the recorder has ended")
     assert "was deleted" in made.finished.result()
