@@ -13,6 +13,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
+from ahv_control.servo_model import AT_ZERO, ModelledServos, ServoModel
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
 from ahv_plant.model.vectors import Rates
 from ahv_plant.numerics.elementwise import elementwise, select
@@ -29,6 +30,7 @@ class LearnerSettings(NamedTuple):
     geometric: bool  # h is a geometric altitude
     first_estimate: float = 0.0  # [deg/s^2] d-hat of the pitch channel before any measurement
     measured_surfaces: bool = False  # the observer hears where they are, not the command
+    servo_model: ServoModel | None = None  # by which it reckons where they are, if there is one
 
 
 class Basis(NamedTuple):
@@ -55,6 +57,7 @@ class LearnerState(NamedTuple):
     W_P: Basis  # weights of d in the roll channel, [deg/s^2] by the units of the basis
     W_Q: Basis  # pitch
     W_R: Basis  # yaw
+    servos: ModelledServos  # where it takes the surfaces to be; at zero without a model of them
 
 
 @elementwise
@@ -200,7 +203,13 @@ def start_learner(rates: Rates, first_estimate: float = 0.0) -> LearnerState:
     """
     none = Basis(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     pitch = Basis(first_estimate, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return LearnerState(rates, rates, none, pitch, none)
+    return LearnerState(rates, rates, none, pitch, none, AT_ZERO)
+
+
+@elementwise
+def with_servos(learner: LearnerState, servos: ModelledServos) -> LearnerState:
+    """Learner that takes the surfaces to be where these servos have them [rad]."""
+    return LearnerState(learner.X_a, learner.X_d, learner.W_P, learner.W_Q, learner.W_R, servos)
 
 
 @elementwise
@@ -224,9 +233,9 @@ def learner_step(
 ) -> LearnerState:
     """Learner one step later (eqs 4.1, 4.3, 4.13), when the rates `now` [rad/s] are measured.
 
-    `response` is f(X, U) [rad/s^2] of the nominal model one step ago, under the surfaces commanded
-    then; `command` are the P*, Q*, R* [rad/s] of then. The step is implicit: basis and error are
-    those of now, which is what makes the Lyapunov function fall in discrete time.
+    `response` is f(X, U) [rad/s^2] of the nominal model one step ago, under the surfaces as the
+    observer has them; `command` are the P*, Q*, R* [rad/s] of then. The step is implicit: basis
+    and error are those of now, which is what makes the Lyapunov function fall in discrete time.
     """
     estimate = disturbance_estimate(learner, now)
     P, Q, R = now.P * DEGREES, now.Q * DEGREES, now.R * DEGREES
@@ -241,4 +250,4 @@ def learner_step(
     R_a, W_R = _learn(now.R, R_next, k_ap.R, learner.W_R, direction, strength, k_b)
     rate = error_decay(X_d, command, settings.tracking)  # nominal plant and law, eq 4.1
     X_d = Rates(X_d.P + STEP * rate.P, X_d.Q + STEP * rate.Q, X_d.R + STEP * rate.R)
-    return LearnerState(Rates(P_a, Q_a, R_a), X_d, W_P, W_Q, W_R)
+    return LearnerState(Rates(P_a, Q_a, R_a), X_d, W_P, W_Q, W_R, learner.servos)

@@ -8,6 +8,7 @@ from ahv_control.flight_control import first_learner, next_learner
 from ahv_control.held_inputs import held_positions, held_rates, held_surfaces, nothing
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.parameters import LEARNER_PARAMETERS, learner_settings
+from ahv_control.servo_model import next_model
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.process import run
@@ -89,7 +90,7 @@ class DisturbanceLearnerNode(BaseNode):
         assert self._learner is not None
         state = State(*now)
         if before is None:
-            learner = self._anew(state)
+            learner = self._anew(state, surfaces)
         else:
             learner = next_learner(
                 self._learner,
@@ -106,14 +107,15 @@ class DisturbanceLearnerNode(BaseNode):
             self.health.extreme("barrier_share", error * DEGREES / self._law.k_b)
             if error * DEGREES >= self._law.k_b:
                 self.fault(stamp, Fault.BARRIER_BREACH, f"{error * DEGREES:.3g} deg/s")
-                learner = self._anew(state)
+                learner = self._anew(state, surfaces)
         self._publish(stamp + STEP_NS, state, learner)
 
-    def _anew(self, state: State) -> LearnerState:
-        """Observer at the state, with the weights so far."""
+    def _anew(self, state: State, surfaces: Values) -> LearnerState:
+        """Observer at the state, with the weights so far, and the servos on their way."""
         assert self._learner is not None
         start = first_learner(state, self._law)
-        return self._learner._replace(X_a=start.X_a, X_d=start.X_d)
+        servos = next_model(self._learner.servos, Surfaces(*surfaces), self._law.servo_model)
+        return self._learner._replace(X_a=start.X_a, X_d=start.X_d, servos=servos)
 
     def _publish(self, stamp: int, state: State, learner: LearnerState) -> None:
         self._learner = learner

@@ -9,16 +9,23 @@ from ahv_control.disturbance_learner import (
     disturbance_estimate,
     learner_step,
     start_learner,
+    with_servos,
 )
 from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_demand
 from ahv_control.intermediate_loop import IntermediateLoop, rate_command
 from ahv_control.law import Commands
 from ahv_control.newton_raphson import nominal_response, solve_surfaces
 from ahv_control.outer_loop import OuterLoop, attitude_command
+from ahv_control.servo_model import (
+    ServoModel,
+    modelled_surfaces,
+    next_model,
+    resting_model,
+)
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
 from ahv_plant.model.vectors import Measurement, Rates, State, Surfaces
 from ahv_plant.numerics.elementwise import elementwise, select
-from ahv_plant.numerics.optional import optional
+from ahv_plant.numerics.optional import changed_by, optional
 
 # The search for the first command starts here; later ones start at the command before.
 NEUTRAL = Surfaces(0.0, 0.0, 0.0)
@@ -79,8 +86,21 @@ def answer(
 
 @optional
 def first_learner(state: State, settings: LearnerSettings) -> LearnerState:
-    """Learner for the first `state` of a flight; None without `settings`."""
-    return start_learner(Rates(state.P, state.Q, state.R), settings.first_estimate)
+    """Learner for the first `state` of a flight; None without `settings`.
+
+    Its model of the servos, if it has one, starts at rest where the nominal vehicle is in balance.
+    """
+    start = start_learner(Rates(state.P, state.Q, state.R), settings.first_estimate)
+    learner: LearnerState = _in_balance(start, state, settings.geometric, settings.servo_model)
+    return learner
+
+
+@changed_by
+def _in_balance(
+    learner: LearnerState, state: State, geometric: bool, model: ServoModel
+) -> LearnerState:
+    surfaces, _ = solve_surfaces(state, Rates(0.0, 0.0, 0.0), NEUTRAL, geometric)
+    return with_servos(learner, resting_model(surfaces, model))
 
 
 @optional
@@ -94,17 +114,19 @@ def next_learner(
 ) -> LearnerState:
     """Learner now, from the state `before` and the surfaces and rates that were commanded then.
 
-    Where surfaces are measured, those are what the observer of eq 4.3 is told, instead of the
-    commanded ones: else it would take every lag of an actuator for a disturbance of the vehicle.
-    None without `settings`.
+    The observer of eq 4.3 is told the surfaces as measured now, or where a model of the servos has
+    them, instead of the commanded ones: else it would take every lag of an actuator for a
+    disturbance of the vehicle. None without `settings`.
     """
+    servos = next_model(learner.servos, surfaces, settings.servo_model)
+    reckoned = modelled_surfaces(surfaces, servos, settings.servo_model)
     acting = Surfaces(
-        select(settings.measured_surfaces, now.surfaces.right_elevon, surfaces.right_elevon),
-        select(settings.measured_surfaces, now.surfaces.left_elevon, surfaces.left_elevon),
-        select(settings.measured_surfaces, now.surfaces.rudder, surfaces.rudder),
+        select(settings.measured_surfaces, now.surfaces.right_elevon, reckoned.right_elevon),
+        select(settings.measured_surfaces, now.surfaces.left_elevon, reckoned.left_elevon),
+        select(settings.measured_surfaces, now.surfaces.rudder, reckoned.rudder),
     )
     return learner_step(
-        learner,
+        with_servos(learner, servos),
         nominal_response(before, acting, settings.geometric),
         command,
         Rates(now.state.P, now.state.Q, now.state.R),

@@ -2,12 +2,14 @@
 """Parameters of the controller nodes, by default those of section 3.5.2, and their settings."""
 
 from collections.abc import Mapping
+from math import inf
 
 from ahv_control.disturbance_learner import LearnerSettings
 from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.inner_loop import InnerLoop
 from ahv_control.intermediate_loop import IntermediateLoop
 from ahv_control.outer_loop import OuterLoop
+from ahv_control.servo_model import ServoModel
 from ahv_control.velocity_loop import VelocityLoop
 from ahv_msgs_py.parameters import Parameter, Value
 from ahv_plant.model.constants import RADIANS
@@ -15,6 +17,8 @@ from ahv_plant.model.vectors import Rates
 from ahv_plant.start import GEOMETRIC_ALTITUDE
 
 FASTEST = 50.0  # [1/s] gains above half the control rate cannot be meant
+# the surfaces that the observer of eq 4.3 hears
+COMMANDED, MODELLED, MEASURED = "commanded", "modelled", "measured"
 
 
 def _gain(name: str, default: float, description: str, in_flight: bool = True) -> Parameter:
@@ -86,11 +90,20 @@ LEARNER_PARAMETERS = (
         100.0,
     ),
     Parameter(
-        "measured_surfaces",
-        False,
-        "the observer of eq 4.3 hears the surfaces as measured, which takes a plant of hardware "
-        "that is not ideal; if false, as commanded",
+        "observer_surfaces",
+        COMMANDED,
+        "surfaces that the observer of eq 4.3 hears: as commanded, as the servo_model moves on "
+        "these commands, or as measured, which takes a plant of hardware that is not ideal",
+        choices=(COMMANDED, MODELLED, MEASURED),
     ),
+    Parameter("servo_model.order", 1, "order of the model; 0 moves at once", "", 0, 2),
+    Parameter(
+        "servo_model.bandwidth", 30.0, "bandwidth, or natural frequency", "rad/s", 0.1, 200.0
+    ),
+    Parameter("servo_model.damping", 0.7, "damping of a model of second order", "", 0.0, 5.0),
+    Parameter("servo_model.rate_limit", 60.0, "rate limit; 0 is off", "deg/s", 0.0, 1000.0),
+    Parameter("servo_model.lower_stop", -40.0, "stop, trailing edge up", "deg", -90.0, 0.0),
+    Parameter("servo_model.upper_stop", 30.0, "stop, trailing edge down", "deg", 0.0, 90.0),
     GEOMETRIC_ALTITUDE,
 )
 VELOCITY_PARAMETERS = (
@@ -134,6 +147,22 @@ def inner_loop(values: ParameterValues) -> InnerLoop:
     )
 
 
+def _servo_model(values: ParameterValues) -> ServoModel:
+    """Model of the servos in SI units from checked parameters."""
+
+    def value(part: str) -> float:
+        return float(values[f"servo_model.{part}"])
+
+    return ServoModel(
+        int(value("order")),
+        value("bandwidth"),
+        value("damping"),
+        value("rate_limit") * RADIANS or inf,
+        value("lower_stop") * RADIANS,
+        value("upper_stop") * RADIANS,
+    )
+
+
 def learner_settings(values: ParameterValues) -> LearnerSettings:
     """Disturbance-learner settings from checked parameters."""
     return LearnerSettings(
@@ -144,7 +173,8 @@ def learner_settings(values: ParameterValues) -> LearnerSettings:
         float(values["theta"]),
         bool(values["geometric_altitude"]),
         float(values["first_estimate"]),
-        bool(values["measured_surfaces"]),
+        values["observer_surfaces"] == MEASURED,
+        _servo_model(values) if values["observer_surfaces"] == MODELLED else None,
     )
 
 

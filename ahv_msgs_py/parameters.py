@@ -36,10 +36,13 @@ class Parameter(NamedTuple):
     minimum: float | None = None
     maximum: float | None = None
     in_flight: bool = False  # may be changed while the vehicle flies
+    choices: tuple[str, ...] = ()  # of a text: what it may be, if not anything
 
     @property
     def valid(self) -> str:
         """What is valid, in words."""
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
         kind = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}
         words = kind[type(self.default)]
         if self.minimum is not None:
@@ -57,6 +60,8 @@ class Parameter(NamedTuple):
             fits = isfinite(value)
             if self.minimum is not None and self.maximum is not None:
                 fits = fits and self.minimum <= value <= self.maximum
+        if self.choices:
+            fits = value in self.choices
         if not fits or not isinstance(value, bool | int | float | str):
             shown = excerpt(value) if isinstance(value, str) else repr(value)
             raise ParameterError(f"{node}: {self.name} is {shown}, but must be {self.valid}")

@@ -81,6 +81,7 @@ def explicit_step(loop: Loop, settings: LearnerSettings) -> LearnerState:
         add_scaled(learner.W_P, STEP * e_P / (b * b - e_P * e_P), direction),
         add_scaled(learner.W_Q, STEP * e_Q / (b * b - e_Q * e_Q), direction),
         add_scaled(learner.W_R, STEP * e_R / (b * b - e_R * e_R), direction),
+        learner.servos,
     )
 
 

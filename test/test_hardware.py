@@ -59,7 +59,7 @@ ARRAYS = (
 def case():
     given = load_case("neuro_adaptive_sc_gdi_protected").parameters
     plant = given["plant"] | TYPICAL | {"duration": 12.0}
-    learner = given["disturbance_learner"] | {"measured_surfaces": True}
+    learner = given["disturbance_learner"] | {"observer_surfaces": "measured"}
     return make_case("typical", given | {"plant": plant, "disturbance_learner": learner})
 
 
@@ -144,20 +144,19 @@ def test_an_ideal_flight_has_no_topic_of_hardware(tmp_path):
 def test_ideal_surfaces_are_measured_by_nobody():
     """A graph would wait for the measurement for ever; the command is the same."""
     given = load_case("neuro_adaptive_di", {"duration": 0.2}).parameters
-    learner = given["disturbance_learner"] | {"measured_surfaces": True}
+    learner = given["disturbance_learner"] | {"observer_surfaces": "measured"}
     case = make_case("ideal", given | {"disturbance_learner": learner})
-    assert case.control.learner.measured_surfaces is False
     assert case.parameters == given
 
 
-@pytest.mark.parametrize("measured", [False, True])
-def test_the_learner_hears_measured_surfaces_where_it_should(case, bags, measured):
+@pytest.mark.parametrize("heard", ["commanded", "modelled", "measured"])
+def test_the_learner_hears_measured_surfaces_where_it_should(case, bags, heard):
     """Its answers differ from the recorded ones if it is told something else than in flight."""
     given = of_one(case).parameters
-    learner = given["disturbance_learner"] | {"measured_surfaces": measured}
+    learner = given["disturbance_learner"] | {"observer_surfaces": heard}
     other = make_case("other", given | {"disturbance_learner": learner})
     flown = replay(read_recording(bags / "graph"), other, ["disturbance_learner"])
-    assert bool(total(flown.comparisons)["differences"]) is not measured
+    assert bool(total(flown.comparisons)["differences"]) is (heard != "measured")
 
 
 def test_a_plant_that_is_configured_again_has_its_draws_and_its_delay_again(case):

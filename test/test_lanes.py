@@ -71,8 +71,8 @@ def case():
 
 @pytest.fixture(scope="module")
 def ends(case):
-    """Last states and learners (13 + 39, LANES) of a batch of 15 000 steps at 40 %."""
-    result = np.empty((13 + 39, LANES))
+    """Last states and learners (13 + 45, LANES) of a batch of 15 000 steps at 40 %."""
+    result = np.empty((13 + 45, LANES))
     last_of_batch(
         as_lanes([case.plant.initial] * LANES),
         as_lanes([draw_dispersion(0.4, SEED, run) for run in range(LANES)]),
@@ -100,8 +100,9 @@ from ahv_plant.dispersion import draw_dispersion
 plant = dispersion_parameters(draw_dispersion(0.4, {seed}, {run}))
 for step in fly(load_case("neuro_adaptive_sc_gdi_protected", plant)):
     pass
-learner = [number for part in step.learner for number in part]
-print(*(number.hex() for number in [*step.state, *learner]))
+learner = [number for part in step.learner[:-1] for number in part]
+servos = [number for servo in step.learner.servos for number in servo]
+print(*(number.hex() for number in [*step.state, *learner, *servos]))
 """
 
 

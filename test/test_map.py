@@ -141,14 +141,16 @@ def test_a_pattern_sets_every_parameter_of_its_kind_in_every_node():
 
 def test_what_the_hardware_of_a_point_decides_is_decided_at_the_point():
     """A case that is ideal has no measured surfaces; a point of it that has a delay does."""
-    map_ = Map(CASE, read_case(CASE)[1], read_axis("latency.delay=0:0.02:2"), tiny().y, 0.3, 1, 0)
+    given = with_value(
+        read_case(CASE)[1], *read_settings(["observer_surfaces=measured"])["observer_surfaces"]
+    )
+    map_ = Map(CASE, given, read_axis("latency.delay=0:0.02:2"), tiny().y, 0.3, 1, 0)
     heard = {
-        x: c.case.control.learner.measured_surfaces
+        x: c.case.parameters["disturbance_learner"]["observer_surfaces"]
         for (x, y), c in map_.campaigns.items()
         if y == 0.0
     }
-    delayed = load_case(CASE, {"latency.delay": 0.02}).control.learner.measured_surfaces
-    assert heard == {0.0: False, 0.02: delayed}
+    assert heard == {0.0: "commanded", 0.02: "measured"}
 
 
 def test_values_of_an_axis_are_those_that_one_would_write():
@@ -158,12 +160,12 @@ def test_values_of_an_axis_are_those_that_one_would_write():
 
 
 def test_a_setting_has_the_type_of_its_parameter():
-    settings = read_settings(["measured_surfaces=false", "duration=60"])
+    settings = read_settings(["observer_surfaces=commanded", "duration=60"])
     _, given = read_case(CASE, hardware="typical")
     for places, value in settings.values():
         given = with_value(given, places, value)
     case = make_case(CASE, given)
-    assert case.parameters["disturbance_learner"]["measured_surfaces"] is False
+    assert case.parameters["disturbance_learner"]["observer_surfaces"] == "commanded"
     assert case.plant.steps == 6000
 
 
@@ -179,7 +181,7 @@ def test_a_setting_has_the_type_of_its_parameter():
         ((X, "level=0:2"), ("level is 2.0", "0 to 0.9")),
         (("latency.delay=0:9", Y), ("latency.delay is 9.0", "0 to")),
         (("latency.delay=0:0.1:4", Y), ("latency.delay is 0.03333", "whole steps of 0.01 s")),
-        ((X, "measured_surfaces=0:1"), ("measured_surfaces", "true or false")),
+        ((X, "observer_surfaces=0:1"), ("observer_surfaces", "one of commanded, modelled")),
         ((X, "dispersion.CL=0.9:1.1"), ("dispersion.CL", "drawn for every run")),
         ((X, "sensor.*.noise=0:1"), ("sensor.*.noise", "deg/s and", "parameters in")),
         ((X, "latency.*=0:0.1"), ("latency.*",)),

@@ -10,7 +10,7 @@ import hashlib
 import math
 import random
 
-from ahv_analysis.flight.case import load_case
+from ahv_analysis.flight.case import load_case, make_case
 from ahv_analysis.flight.library import fly
 from ahv_control.newton_raphson import angular_response, flight_condition, solve_surfaces
 from ahv_plant.model.vectors import Rates
@@ -83,6 +83,10 @@ for run in range(100):
 for case in {cases!r}:
     for step in fly(load_case(case, {"duration": 2.0})):
         show(case, (step.state, step.commands, step.learner or ()))
+given = load_case("neuro_adaptive_di", {"duration": 1.0}, hardware="typical").parameters
+learner = given["disturbance_learner"] | {"observer_surfaces": "modelled"}
+for step in fly(make_case("hedging", given | {"disturbance_learner": learner})):
+    show("hedging", (step.state, step.commands, step.learner))
 """
 
 
@@ -102,5 +106,5 @@ def test_plain_floats_and_compiled_code_agree_in_every_bit():
     cases = ["nominal_di", "neuro_adaptive_di", "neuro_adaptive_sc_gdi_protected"]
     compiled = run(cases, NUMBA_DISABLE_JIT="0")
     plain = run(cases, NUMBA_DISABLE_JIT="1")
-    assert len(compiled) == 22 + 6 + 2 + 600 + 201 * len(cases)
+    assert len(compiled) == 22 + 6 + 2 + 600 + 201 * len(cases) + 101
     assert compiled == plain

@@ -12,6 +12,9 @@ from typing import NamedTuple
 from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
 from ahv_control.parameters import (
+    COMMANDED,
+    LEARNER_PARAMETERS,
+    MEASURED,
     inner_loop,
     intermediate_loop,
     learner_settings,
@@ -29,7 +32,11 @@ from ahv_plant.parameters import HARDWARE_PARAMETERS, PlantSettings, plant_setti
 from ahv_plant.trim import check_flight_condition
 
 HARDWARE = {("plant", parameter.name) for parameter in HARDWARE_PARAMETERS + WIND_PARAMETERS}
-HARDWARE |= {("disturbance_learner", "measured_surfaces")}
+HARDWARE |= {
+    ("disturbance_learner", parameter.name)  # what the flight software knows of the hardware
+    for parameter in LEARNER_PARAMETERS
+    if parameter.name.startswith(("observer_surfaces", "servo_model."))
+}
 
 TRUE = ("dispersion.", "disturbance.", "wind.", "gust.", "turbulence.")  # of the plant alone
 
@@ -125,7 +132,7 @@ def load_hardware(name: str, namespace: str = NAMESPACE) -> dict[str, dict[str, 
                 raise ParameterError(
                     f"{path.name}: {node}: {parameter} has no place in a hardware file; valid are "
                     "the plant's actuators, latency, failures, sensors and wind, and "
-                    "measured_surfaces of the disturbance_learner"
+                    "observer_surfaces and servo_model of the disturbance_learner"
                 )
     return given
 
@@ -158,7 +165,9 @@ def make_case(
     }
     plant = plant_settings(parameters["plant"])
     if plant.hardware is None:  # surfaces are where they are commanded to be: nobody measures them
-        parameters["disturbance_learner"]["measured_surfaces"] = False
+        learner = parameters["disturbance_learner"]
+        if learner["observer_surfaces"] == MEASURED:
+            learner["observer_surfaces"] = COMMANDED
     _check_commands(parameters, plant)
     adaptive = parameters["inner_loop"]["adaptive"]
     control = FlightControl(

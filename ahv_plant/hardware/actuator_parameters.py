@@ -62,7 +62,12 @@ FAILURES = tuple(failure.name.lower() for failure in Failure)
 ACTUATOR_PARAMETERS = (
     *(parameter for name in _KINDS for parameter in _of_actuator(name)),
     *(
-        Parameter(f"failure.{control}", "none", f"what fails: {', '.join(FAILURES)}")
+        Parameter(
+            f"failure.{control}",
+            "none",
+            f"what fails: {', '.join(FAILURES)}",
+            choices=FAILURES,
+        )
         for control in _ACTUATORS
     ),
     Parameter("failure.time", 0.0, "time of the failures", "s", 0.0, 3600.0),
@@ -102,11 +107,6 @@ def _actuator(values: Mapping[str, Value], control: str) -> Actuator:
     def value(part: str) -> float:
         return float(values[f"actuator.{name}.{part}"])
 
-    failure = str(values[f"failure.{control}"])
-    if failure not in FAILURES:
-        raise ParameterError(
-            f"plant: failure.{control} is {failure!r}, but must be one of {', '.join(FAILURES)}"
-        )
     return Actuator(
         int(value("order")),
         value("bandwidth"),
@@ -116,7 +116,7 @@ def _actuator(values: Mapping[str, Value], control: str) -> Actuator:
         kind.upper,
         value("dead_zone") * kind.scale,
         value("backlash") * kind.scale,
-        FAILURES.index(failure),
+        FAILURES.index(str(values[f"failure.{control}"])),
         float(values["failure.time"]),
     )
 

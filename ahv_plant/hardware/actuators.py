@@ -10,6 +10,7 @@ for the engine.
 from enum import IntEnum
 from typing import NamedTuple
 
+from ahv_plant.model.servo import servo_motion
 from ahv_plant.model.vectors import clamp
 from ahv_plant.numerics.elementwise import elementwise, select
 
@@ -69,21 +70,16 @@ def ordered(servo: Servo, command: float, time: float, actuator: Actuator) -> fl
 def servo_rate(servo: Servo, told: float, time: float, actuator: Actuator) -> Servo:
     """Rates of the servo's states on its way to what it was `told`, at `time` [s].
 
-    First order: x' = w e; second order: x'' = w (w e - 2 zeta x'), with the error e behind the
-    dead zone and x' within the rate limit, beyond which it does not wind up.
+    Its error is behind the dead zone.
     """
     error = told - servo.position
     noticed = error - clamp(error, -actuator.dead_zone, actuator.dead_zone)
-    wanted = actuator.frequency * noticed
-    limit = actuator.rate_limit
-    rate = clamp(servo.rate, -limit, limit)
-    push = actuator.frequency * (wanted - 2.0 * actuator.damping * rate)
-    none = 0.0 * push
-    outward = ((rate >= limit) & (push > 0.0)) | ((rate <= -limit) & (push < 0.0))
+    motion = servo_motion(servo.rate, noticed, actuator)
+    none = 0.0 * motion.velocity
     stuck = (time >= actuator.failure_time) & (actuator.failure == 1)
-    moving = select(actuator.order == 2, rate, clamp(wanted, -limit, limit))
-    gaining = select(actuator.order == 2, select(outward, none, push), none)
-    return Servo(select(stuck, none, moving), select(stuck, none, gaining), none)
+    return Servo(
+        select(stuck, none, motion.velocity), select(stuck, none, motion.acceleration), none
+    )
 
 
 @elementwise
