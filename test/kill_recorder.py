@@ -38,6 +38,7 @@ from ahv_plant.plant_node import PlantNode
 
 BOUND = 0.2  # [s] of wall time that a killed recorder may lose
 LOOK = 0.002  # [s] between looks at the plant
+LONGEST_START = 240.0  # [s] of all recorders, on a machine that has much else to do
 
 
 class Kill(NamedTuple):
@@ -87,16 +88,18 @@ def kill_recorders(folder: Path, moments: Sequence[float], domain: int) -> list[
         started = time.monotonic()
         waiting = dict(zip(bags, zip(moments, recorders, strict=True), strict=True))
         while waiting:
-            now, step = time.monotonic(), plants[0].step
-            steps_at.append((now, step))
+            now = time.monotonic()
+            steps_at.append((now, plants[0].step))
             for bag, (moment, recorder) in list(waiting.items()):
                 file = bag / f"{bag.name}.mcap"
                 if bag not in begun:  # not before the bag has a step, however slow the machine
                     if _last_steps(file)[0] >= 0:
                         begun.add(bag)
                 elif now - started >= moment:
+                    died = time.monotonic()
                     recorder.kill()
-                    steps_of_death[bag] = (now, step)
+                    recorder.wait()
+                    steps_of_death[bag] = (died, plants[0].step)  # it has none of a later step
                     del waiting[bag]
             time.sleep(LOOK)
 
@@ -104,13 +107,14 @@ def kill_recorders(folder: Path, moments: Sequence[float], domain: int) -> list[
         if len(steps_of_death) == len(bags):
             raise _Enough
 
-    watcher = threading.Thread(target=watch)
+    watcher = threading.Thread(target=watch, daemon=True)  # a flight that fails ends it too
     watcher.start()
     try:
         with (
             suppress(_Enough),
             patch.object(one_process, "PlantNode", Plant),
             patch.object(plant_node, "LONGEST_WAIT", 0.0),  # the dead acknowledge nothing
+            patch.object(one_process, "LONGEST_SILENCE", LONGEST_START),
         ):
             fly_graph(load_case("nominal_di"), None, domain=domain, progress=progress)
     finally:

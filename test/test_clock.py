@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from test.waiting import PATIENCE
+
 LIBRARY = "usr/lib/*/faketime/libfaketimeMT.so.1"  # where Debian has it
 # Sets the clock after one second of flight, and sees the flight flown to its end.
 FLIGHT = """
@@ -54,6 +56,8 @@ def test_a_clock_that_is_set_in_flight_moves_no_step(hours, library, tmp_path, d
         "FAKETIME_DONT_FAKE_MONOTONIC": "1",
     }
     program = [sys.executable, "-c", FLIGHT, str(file), f"{3600 * hours:+d}", str(domain)]
-    flown = subprocess.run(program, env=environment, capture_output=True, text=True, timeout=100)
+    flown = subprocess.run(
+        program, env=environment, capture_output=True, text=True, timeout=PATIENCE
+    )
     assert flown.returncode == 0, flown.stderr
     assert int(flown.stdout.split()[-1]) == 3600 * hours  # it was set

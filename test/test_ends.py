@@ -16,25 +16,20 @@ from ahv_analysis.bag.reader import load_bag
 from ahv_analysis.flight import process_per_node
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.process_per_node import ProcessGraph
-from ahv_analysis.flight.shared_memory import pieces, remove_abandoned
+from ahv_analysis.flight.shared_memory import FOLDER, LOCK, pieces, remove_abandoned
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.node.network import DISCOVERY_RANGE, PROFILES, keep_to_this_machine
 from ahv_msgs_py.topics import STATE
+from test.processes import opened
+from test.waiting import PATIENCE, wait_until
 
-PATIENCE = 60.0  # [s] on a busy machine
+STATES = "the flight has states on disk"
 
 
 def descendants(pid):
     """Every process that a process has started, and theirs."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     return {int(child) for child in children}.union(*map(descendants, children))
-
-
-def wait_until(true):
-    deadline = time.monotonic() + PATIENCE
-    while not true():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_nodes_end_with_the_command_that_is_killed(tmp_path):
@@ -44,16 +39,27 @@ def test_nodes_end_with_the_command_that_is_killed(tmp_path):
     program = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     try:
         files = partial(tmp_path.glob, "bag/*.mcap")
-        wait_until(lambda: any(file.stat().st_size > 3e5 for file in files()))  # states among it
+        wait_until(lambda: any(file.stat().st_size > 3e5 for file in files()), STATES)
         started = descendants(program.pid)
         assert len(started) >= 6  # tracker and server, plant, recorder, two controllers at least
         os.kill(max(started), signal.SIGSTOP)
     finally:
         program.kill()
         program.wait()
-    wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in started))
+    wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in started), "all have ended")
     assert (tmp_path / "bag" / "metadata.yaml").is_file()
     assert load_bag(tmp_path / "bag")[STATE.name].messages
+
+
+def held_by(graph):
+    """Locks of the pieces that the nodes of a graph own; tests beside this one have theirs."""
+    links = [
+        link
+        for process in graph.processes.values()
+        for link in opened(process.pid)
+        if link.parent == FOLDER and link.name.startswith("fastrtps_")
+    ]
+    return {link for link in links if link.name.endswith(LOCK)}
 
 
 def in_use(lock):
@@ -71,16 +77,15 @@ def test_what_is_killed_leaves_no_shared_memory(monkeypatch):
     monkeypatch.setenv(DISCOVERY_RANGE, "LOCALHOST")
     monkeypatch.delenv(PROFILES)
     keep_to_this_machine(shared_memory=True)
-    before = pieces()
     with ProcessGraph(load_case("nominal_di", {"duration": 1000.0}), None, False) as graph:
-        wait_until(lambda: graph.report.step > 0)
-        held = pieces() - before
+        wait_until(lambda: graph.report.step > 0, "the graph flies")
+        held = held_by(graph)
         assert held
         remove_abandoned(held)
         assert held <= pieces()  # whoever lives keeps what it has
         for name in graph.values:
             graph.kill(name)
-    ours = [lock for lock in held if not in_use(lock)]  # tests beside this one have pieces too
+    ours = [lock for lock in held if not in_use(lock)]  # another may have a port's number since
     left = {file.name for lock in ours for file in lock.parent.glob(f"*{lock.name[:-3]}*")}
     assert ours and left == set()
 
@@ -90,7 +95,7 @@ def test_all_processes_together_have_one_deadline(monkeypatch):
     monkeypatch.setattr(process_per_node, "LONGEST_REST", 0.5)
     monkeypatch.setattr(process_per_node, "LONGEST_END", 1.0)
     with ProcessGraph(load_case("nominal_di", {"duration": 1000.0}), None, True) as graph:
-        wait_until(lambda: graph.report.step > 0)
+        wait_until(lambda: graph.report.step > 0, "the graph flies")
         monkeypatch.setattr(graph, "signal", lambda name, number: None)  # none of them hears
         processes = list(graph.processes.values())
     assert [process.exitcode for process in processes] == [-signal.SIGKILL] * len(processes)
@@ -143,7 +148,7 @@ def test_an_interrupted_command_ends_though_the_middleware_hangs(tmp_path):
     command = [sys.executable, "-c", HANGS, "nominal_di", "--duration", "1000", "--realtime"]
     flown = subprocess.Popen([*command, "--out", tmp_path], stderr=subprocess.PIPE, text=True)
     files = partial(tmp_path.glob, "bag/*.mcap")
-    wait_until(lambda: any(file.stat().st_size > 3e5 for file in files()))  # states among it
+    wait_until(lambda: any(file.stat().st_size > 3e5 for file in files()), STATES)
     flown.send_signal(signal.SIGINT)
     _, said = flown.communicate(timeout=PATIENCE)
     assert flown.returncode == 128 + signal.SIGINT
@@ -159,7 +164,7 @@ def test_a_signal_while_a_node_is_imported_ends_it_without_a_word():
     codes = []
     for moment in (0.0, 0.1, 0.2, 0.4, 0.8):
         node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-        wait_until(lambda node=node: catches(node.pid, signal.SIGHUP))
+        wait_until(lambda node=node: catches(node.pid, signal.SIGHUP), "it answers signals")
         time.sleep(moment)
         node.send_signal(signal.SIGINT)
         _, said = node.communicate(timeout=PATIENCE)

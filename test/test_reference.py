@@ -21,6 +21,7 @@ from ahv_analysis.report.figures import (
 )
 from ahv_msgs_py.graph import listeners, sender
 from ahv_msgs_py.topics import BY_NAME, LOOP_TOPICS, QUEUE_DEPTH
+from test.waiting import wait_until
 
 ROOT = Path(__file__).parent.parent
 PAGES = [path for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))]
@@ -75,23 +76,29 @@ def test_the_graph_that_flies_is_the_one_that_is_drawn(domain):
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=domain)
     observer = rclpy.create_node("observer", context=context)
+    drawn = {topic: ({sender(name)}, set(listeners(name))) for name, topic in BY_NAME.items()}
     seen = {}
 
-    def look(steps):
+    def number(ends):
+        return sum(len(senders) + len(hearers) for senders, hearers in ends.values())
+
+    def as_many_as_are_drawn():
         for topic in LOOP_TOPICS:
             senders = {end.node_name for end in observer.get_publishers_info_by_topic(topic.name)}
             ends = observer.get_subscriptions_info_by_topic(topic.name)
             seen[topic] = (senders, {end.node_name for end in ends})
+        return number(seen) >= number(drawn)
+
+    def look(steps):  # and the flight waits: of its ends the observer hears by and by
+        wait_until(as_many_as_are_drawn, "the observer knows of all ends")
 
     try:
-        case = load_case("neuro_adaptive_di", {"duration": 60.0}, hardware="typical")
+        case = load_case("neuro_adaptive_di", {"duration": 1.0}, hardware="typical")
         fly_graph(case, None, domain=domain, progress=look)
     finally:
         observer.destroy_node()
         rclpy.shutdown(context=context)
-    assert seen == {
-        topic: ({sender(name)}, set(listeners(name))) for name, topic in BY_NAME.items()
-    }
+    assert seen == drawn
 
 
 @pytest.mark.parametrize("name", ["messages.md", "your_own_controller.md"])

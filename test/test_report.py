@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+from functools import partial
 from math import exp, log, pi, sqrt
 from pathlib import Path
 
@@ -35,6 +36,7 @@ from ahv_analysis.report.page import number, render
 from ahv_analysis.report.page_flight import page_names, read_flights
 from ahv_analysis.report.summary import summarize
 from ahv_plant.model.constants import RADIANS
+from test.waiting import PATIENCE, wait_until
 
 TIME = np.arange(10001) * 0.01  # [s] to 100 s
 EVERY = slice(None, -1)  # sample but the last: whole periods
@@ -190,7 +192,7 @@ def browser():
         stop = pytest.fail if os.environ.get("CI") == "true" else pytest.skip
         stop("there is no Chromium to look at the pages with (Debian: apt-get install chromium)")
     with sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=path)
+        chromium = driver.chromium.launch(executable_path=path, timeout=1e3 * PATIENCE)  # [ms]
         yield chromium
         chromium.close()
 
@@ -202,6 +204,7 @@ def visit(browser):
 
     def opened(file, **options):
         contexts.append(browser.new_context(**options))
+        contexts[-1].set_default_timeout(1e3 * PATIENCE)  # [ms]
         page = contexts[-1].new_page()
         requests, complaints = [], []
         page.on("request", lambda request: requests.append(request.url))
@@ -218,11 +221,7 @@ def visit(browser):
 
 def wait_for(page, condition):
     """Wait until it holds. The page's policy forbids the `eval` with which playwright waits."""
-    for _ in range(1000):
-        if page.evaluate(condition):
-            return
-        page.wait_for_timeout(20)
-    raise AssertionError(f"never: {condition}")
+    wait_until(lambda: page.evaluate(condition), condition, lambda: page.wait_for_timeout(20))
 
 
 def windows(page):
@@ -245,7 +244,8 @@ def test_every_page_is_quiet_and_asks_for_nothing(pages, visit):
         assert complaints == []
         assert [url for url in requests if not url.startswith("data:")] == [Path(file).as_uri()]
         page.evaluate("fetch('https://example.org/').catch(() => null)")
-        assert complaints, "and could not, for its own policy forbids it"
+        look = partial(page.wait_for_timeout, 20)
+        wait_until(complaints.copy, "its own policy forbids it, and the browser says so", look)
         assert all("Content Security Policy" in complaint for complaint in complaints)
 
 

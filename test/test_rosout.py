@@ -3,6 +3,7 @@
 
 import subprocess
 import sys
+from functools import partial
 
 import pytest
 import rclpy
@@ -15,10 +16,10 @@ from ahv_msgs_py.node.network import keep_to_this_machine
 from ahv_msgs_py.node.quality import quality
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.topics import FLIGHT
+from test.waiting import PATIENCE, wait_until
 
 CASE = load_case("neuro_adaptive_di", {"duration": 20.0})
 LISTENERS = {"recorder", *CASE.controllers}
-SOON = 100  # looks at the log of 0.1 s each
 
 
 @pytest.fixture
@@ -39,16 +40,18 @@ def said(tmp_path, domain, monkeypatch):
 
     def look(step):
         executor.spin_once(0.1)
-        if step > 50 and not told:
+        if step > 50 and not told and end.get_subscription_count() == len(LISTENERS):
             told.extend(FLIGHT.layout.encode(stamp, (2000, 7, 1)) for stamp in range(30))
             for message in told:
                 end.publish(message)
 
     fly_processes(CASE, tmp_path / "bag", progress=look)
-    for _ in range(SOON):  # the log comes behind what it tells of
-        if sum("flight over" in one.msg for one in found) > len(LISTENERS):
-            break
-        executor.spin_once(0.1)
+    assert told, "the flight was over before the stranger knew its nodes"
+    wait_until(  # the log comes behind what it tells of
+        lambda: sum("flight over" in one.msg for one in found) > len(LISTENERS),
+        "every node has logged the end",
+        partial(executor.spin_once, 0.1),
+    )
     executor.remove_node(stranger)
     executor.shutdown()
     stranger.destroy_node()
@@ -94,7 +97,7 @@ assert killed
 def test_a_killed_controller_leaves_a_word_on_the_console(domain, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     flown = subprocess.run(
-        [sys.executable, "-c", KILLED_IN_FLIGHT], capture_output=True, text=True, timeout=100
+        [sys.executable, "-c", KILLED_IN_FLIGHT], capture_output=True, text=True, timeout=PATIENCE
     )
     assert flown.returncode == 0, flown.stderr
     said = [line.split("[", 1)[1] for line in flown.stderr.splitlines() if "ahv.plant" in line]
