@@ -43,6 +43,7 @@ from ahv_msgs_py.topics import (
 )
 from test.test_messages import message_of
 from test.test_packaging import ROOT, Noted
+from test.waiting import PATIENCE
 
 SECONDS = 3.0
 STEPS = 301
@@ -327,7 +328,7 @@ def test_nobody_hears_a_replay_and_it_hears_nobody(bags, neighbour, domain):
 
 def test_a_replay_to_be_watched_does_not_speak_into_a_flight(bags, neighbour, domain, monkeypatch):
     neighbour.create_publisher(JointState, SURFACE_COMMAND.name, quality(True))
-    monkeypatch.setattr("ahv_analysis.replay.replay.LISTEN", 5.0)  # on a machine that is busy
+    monkeypatch.setattr("ahv_analysis.replay.replay.LISTEN", PATIENCE)
     with pytest.raises(GraphError, match=r"somebody publishes /ahv/surface_command in this ROS"):
         again(bags / "nominal_di", load_case("nominal_di"), rate=100.0, domain=domain)
 

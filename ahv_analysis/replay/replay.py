@@ -61,7 +61,7 @@ from ahv_plant.model.constants import STEP_NS
 REPLAYED = "/replay"  # before the names of the topics of replayed nodes
 BATCH = 100  # steps that are fed before the answers are waited for
 DEPTH = 2 * BATCH  # messages that a sender keeps: more than are ever on their way
-LISTEN = 1.0  # [s] for other graphs, before anything is said where they could hear it
+LISTEN = 1.0  # [s] at most for other graphs, before anything is said where they could hear it
 LONGEST_SILENCE = 10.0  # [s] without an answer, after which the graph has failed
 LOOK = 0.2  # [s] between looks at the progress
 
@@ -218,13 +218,15 @@ class _Graph:
 
     def refuse_company(self) -> None:
         """Raise GraphError if somebody flies here: recorded commands must not reach a vehicle."""
-        self._spin(LISTEN)
-        for topic in LOOP_TOPICS:
-            if self._feeder.count_publishers(self._name(topic)):
-                raise GraphError(
-                    f"somebody publishes {self._name(topic)} in this ROS domain: "
-                    "set ROS_DOMAIN_ID to one of your own"
-                )
+        until = time.monotonic() + LISTEN
+        while (left := until - time.monotonic()) > 0.0:
+            self._spin(min(left, LOOK))
+            for topic in LOOP_TOPICS:
+                if self._feeder.count_publishers(self._name(topic)):
+                    raise GraphError(
+                        f"somebody publishes {self._name(topic)} in this ROS domain: "
+                        "set ROS_DOMAIN_ID to one of your own"
+                    )
 
     def bring_up(self) -> None:
         """Start the nodes and find out which steps of the recording each of them can answer."""
