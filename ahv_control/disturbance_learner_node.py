@@ -1,6 +1,9 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Node `disturbance_learner`: learns what the nominal model lacks."""
 
+from functools import partial
+from typing import ClassVar
+
 import rclpy
 
 from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
@@ -25,6 +28,8 @@ from ahv_msgs_py.topics import (
 from ahv_plant.model.constants import DEGREES, STEP_NS
 from ahv_plant.model.vectors import Measurement, Rates, State, Surfaces
 
+BEFORE = "the state before"  # an input of its steps, beside the topics
+
 
 class DisturbanceLearnerNode(BaseNode):
     """Answers every state with the disturbance estimate and the state of the learner.
@@ -36,6 +41,10 @@ class DisturbanceLearnerNode(BaseNode):
     """
 
     laws = (first_learner, next_learner, disturbance_estimate)
+    advice: ClassVar = {
+        SURFACES: "a plant measures its surfaces if its hardware is not ideal; observer_surfaces "
+        "may be commanded or modelled as well"
+    }
 
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
@@ -52,14 +61,17 @@ class DisturbanceLearnerNode(BaseNode):
         self.new_flight()
         self._send_learner = self.sender(LEARNER)
         self._send_estimate = self.sender(DISTURBANCE_ESTIMATE)
-        fallbacks = {"before": nothing, "command": held_rates, "surfaces": held_surfaces}
+        self._now, command, surfaces, positions = map(
+            self.full_name, (STATE, RATE_COMMAND, SURFACE_COMMAND, SURFACES)
+        )
+        fallbacks = {BEFORE: nothing, command: held_rates, surfaces: held_surfaces}
         if self._law.measured_surfaces:
-            fallbacks["positions"] = held_positions
-            self.receive(SURFACES, self._positions_arrived)
-        self._put = self.join(("now", *fallbacks), self._learn, fallbacks, wait=False)
+            fallbacks[positions] = held_positions
+            self.receive(SURFACES, partial(self._positions_arrived, positions))
+        put = self._put = self.join((self._now, *fallbacks), self._learn, fallbacks, wait=False)
         self.receive(STATE, self._state_arrived)
-        self.receive(RATE_COMMAND, lambda stamp, values: self._put("command", stamp, values))
-        self.receive(SURFACE_COMMAND, lambda stamp, values: self._put("surfaces", stamp, values))
+        self.receive(RATE_COMMAND, partial(put, command))
+        self.receive(SURFACE_COMMAND, partial(put, surfaces))
 
     def new_flight(self) -> None:
         """Forget what was learned."""
@@ -71,12 +83,12 @@ class DisturbanceLearnerNode(BaseNode):
             state = State(*values)
             self._publish(stamp, state, first_learner(state, self._law))
         else:
-            self._put("now", stamp - STEP_NS, values)
-        self._put("before", stamp, values)
+            self._put(self._now, stamp - STEP_NS, values)
+        self._put(BEFORE, stamp, values)
 
-    def _positions_arrived(self, stamp: int, values: Values) -> None:
+    def _positions_arrived(self, name: str, stamp: int, values: Values) -> None:
         """File positions of the surfaces as what moved the vehicle in the step before."""
-        self._put("positions", stamp - STEP_NS, values)
+        self._put(name, stamp - STEP_NS, values)
 
     def _learn(
         self,

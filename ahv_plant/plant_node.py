@@ -3,6 +3,7 @@
 
 import time
 from array import array
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -20,7 +21,7 @@ from ahv_msgs_py.node.health import ERROR, MILLISECONDS, OK, percentile
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.quality import quality
-from ahv_msgs_py.node.synchronizer import Stepwise, Values
+from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import (
     BODY_FRAME,
@@ -112,9 +113,9 @@ class PlantNode(BaseNode):
                 self.receive(held.topic, partial(self._hold, held))
         else:
             topics = (SURFACE_COMMAND, THROTTLE_COMMAND)
-            steps = Stepwise([self.full_name(topic) for topic in topics], self._answered)
+            put = self.in_lockstep([self.full_name(topic) for topic in topics], self._answered)
             for topic in topics:
-                self.receive(topic, partial(self._take, steps, self.full_name(topic)))
+                self.receive(topic, partial(self._take, put, self.full_name(topic)))
         viewers = quality(True, self.sender_depth)
         self._send_clock = self.publisher(CLOCK.type_name, CLOCK.name, viewers)
         self._odometry = self.publisher(ODOMETRY.type_name, ODOMETRY.name, viewers)
@@ -198,12 +199,14 @@ class PlantNode(BaseNode):
 
     # Lockstep
 
-    def _take(self, steps: Stepwise, name: str, stamp: int, values: Values) -> None:
+    def _take(
+        self, put: Callable[[str, int, Values], None], name: str, stamp: int, values: Values
+    ) -> None:
         """Take a command, unless it answers a state that was never sent: one of another flight."""
         if self.finished.done():
             return
         if self._flying and stamp <= self.step * STEP_NS:
-            steps.put(name, stamp, values)
+            put(name, stamp, values)
         else:
             self._finish(
                 0, ERROR, f"{name} has commands of another flight: restart the controllers"

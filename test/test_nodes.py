@@ -7,6 +7,7 @@ from functools import partial
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -16,6 +17,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from ahv_analysis.flight.case import case_names, load_case
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES
+from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.messages import message_class
 from ahv_msgs_py.node.quality import SENDER_DEPTH
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
@@ -150,6 +152,34 @@ def test_an_impossible_transition_is_refused_and_changes_nothing(graph):
     assert flown.change("velocity", Transition.TRANSITION_CONFIGURE)
     assert not flown.change("velocity", Transition.TRANSITION_CONFIGURE)
     assert flown.state("velocity") == "inactive"
+
+
+def test_a_topic_that_no_node_sends_is_named_and_not_waited_for_in_silence(graph):
+    """Surfaces that are to be measured, of a plant on which nobody measures them."""
+    flown = graph(
+        *CASE.controllers,
+        "plant",
+        plant={"listeners": 4},
+        disturbance_learner={"observer_surfaces": "measured"},
+    )
+    told = []
+    flown.client.create_subscription(
+        DiagnosticArray,
+        DIAGNOSTICS.name,
+        lambda message: told.extend(status.message for status in message.status),
+        flown.nodes["plant"].loop_quality(),
+    )
+    for node in flown.nodes.values():
+        node.bring_up()
+    look = partial(flown.executor.spin_once, 0.01)
+    wait_until(lambda: any("not sent" in text for text in told), "it is told", look)
+    found = {text for text in told if "not sent" in text}
+    assert len(found) == 1
+    (sentence,) = found
+    assert sentence.startswith("input not sent: /ahv/surfaces is waited for, and no node sends it")
+    assert "hardware is not ideal" in sentence and "observer_surfaces" in sentence
+    assert flown.nodes["disturbance_learner"].health.total[Fault.INPUT_NOT_SENT] == 1
+    assert flown.nodes["plant"].step == 1
 
 
 def test_an_inactive_node_does_not_answer(graph):

@@ -42,3 +42,14 @@ def test_lockstep_order_answers_every_step():
         inputs.put(first, k * STEP, ())
         inputs.put(second, k * STEP, ())
     assert answers == [k * STEP for k in range(5)]
+
+
+def test_it_says_what_the_first_step_that_is_not_answered_waits_for():
+    inputs = Stepwise(("a", "b", "c"), lambda *answered: None)
+    assert inputs.awaited() is None
+    inputs.put("b", 2 * STEP, ())
+    inputs.put("b", STEP, ())
+    assert inputs.awaited() == (STEP, ("a", "c"))
+    for name in "ac":
+        inputs.put(name, STEP, ())
+    assert inputs.awaited() == (2 * STEP, ("a", "c"))

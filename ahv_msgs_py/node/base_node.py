@@ -6,7 +6,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -38,10 +38,16 @@ from ahv_msgs_py.topics import (
 
 LOG_PERIOD = 5.0  # [s] of wall time; a flight in lockstep is thirty times as fast as time
 STATE_LOST_AFTER = 500_000_000  # [ns]
+PATIENCE = 3  # [s] for an input that no node sends
 
 
 class BaseNode(ManagedNode):
-    """A node of the graph, without its law."""
+    """A node of the graph, without its law.
+
+    Its `advice` is what to do about a topic that it waits for and that no node sends.
+    """
+
+    advice: ClassVar[Mapping[LoopTopic, str]] = {}
 
     def __init__(
         self,
@@ -58,6 +64,8 @@ class BaseNode(ManagedNode):
         self._state_heard = 0  # [ns] by the steady clock
         self._state_lost = False
         self._flight_over = False  # the plant has told the end of the flight
+        self._awaited: tuple[int, tuple[str, ...]] | None = None  # by the step that waits
+        self._waited = 0  # [s] for that
         self._logged: dict[Fault, float] = {}  # [s] by the steady clock when each was last
         self.heard: dict[LoopTopic, Guard] = {}  # what the node listens to of the loop
         self._diagnostics = self.create_publisher(
@@ -70,14 +78,17 @@ class BaseNode(ManagedNode):
         """Open the topics and start from the beginning, in real time with memory at hand."""
         self.now = None
         if self.realtime:
-            timer = self.create_timer(1.0, self._watch)
-            self._opened.append(partial(self.destroy_timer, timer))
+            self._every_second(self._watch)
             reserve_memory()
             gc.collect()
             gc.freeze()  # what lives until the end need not be looked at again
             gc.disable()  # from here on `_watch` collects, between two steps
         self._tell_settings()
         super().activate()
+
+    def _every_second(self, look: Callable[[], None]) -> None:
+        timer = self.create_timer(1.0, look)
+        self._opened.append(partial(self.destroy_timer, timer))
 
     def close(self) -> None:
         """Close what was opened."""
@@ -239,7 +250,18 @@ class BaseNode(ManagedNode):
 
         if self.realtime:
             return RealTimeSteps(inputs, ready, fallbacks, self._missing, wait).put
-        return Stepwise(inputs, ready).put
+        return self.in_lockstep(inputs, ready)
+
+    def in_lockstep(
+        self, inputs: Sequence[str], ready: Callable[..., None]
+    ) -> Callable[[str, int, Values], None]:
+        """Collect the inputs of a step, and tell which one no node sends; returns what takes them.
+
+        An input is known by the full name of its topic.
+        """
+        steps = Stepwise(inputs, ready)
+        self._every_second(partial(self._watch_steps, steps))
+        return steps.put
 
     def receive_together(
         self, answer: Callable[..., None], fallbacks: Mapping[LoopTopic, Fallback]
@@ -292,6 +314,24 @@ class BaseNode(ManagedNode):
         if self._state_lost:
             level, text = ERROR, "no state"
         self.announce(stamp, level, text, **facts)
+
+    def _watch_steps(self, steps: Stepwise) -> None:
+        """Once a second in lockstep, when there is nothing else to do: look for what is not sent.
+
+        Lockstep waits for ever, and rightly so; whoever started the nodes should know for what.
+        """
+        awaited = steps.awaited()
+        self._waited = self._waited + 1 if awaited == self._awaited else 0
+        self._awaited = awaited
+        if awaited is None or self._waited != PATIENCE or self._flight_over:
+            return
+        stamp, absent = awaited
+        for topic in self.heard:
+            name = self.full_name(topic)
+            if name in absent and not self.count_publishers(name):
+                text = f"{name} is waited for, and no node sends it"
+                advice = f": {self.advice[topic]}" if topic in self.advice else ""
+                self.fault(stamp, Fault.INPUT_NOT_SENT, text + advice)
 
     def _watch(self) -> None:
         """Once a second in real time: look for a state that has gone, report, tidy up."""

@@ -100,6 +100,13 @@ class Fault(Enum):
         "the next one and keeps its weights",
         "10 ms",
     )
+    INPUT_NOT_SENT = Response(
+        "plant and controllers, in lockstep",
+        "an input of a step is waited for, and no node sends its topic",
+        "it is waited for; the message names the topic",
+        "3 to 4 s",
+        error=True,
+    )
     STATE_LOST = Response(
         "every controller, in real time",
         "no valid state for 500 ms",

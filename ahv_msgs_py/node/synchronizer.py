@@ -35,6 +35,14 @@ class Stepwise:
             self._waiting = {later: put for later, put in self._waiting.items() if later > stamp}
             self._ready(stamp, *(step[name] for name in self._inputs))
 
+    def awaited(self) -> tuple[int, tuple[str, ...]] | None:
+        """Stamp [ns] of the first step that has inputs, but not all, and which have not come."""
+        if not self._waiting:
+            return None
+        stamp = min(self._waiting)
+        there = self._waiting[stamp]
+        return stamp, tuple(name for name in self._inputs if name not in there)
+
 
 class RealTimeSteps:
     """Real time: as `Stepwise`, but a step whose inputs do not come is not waited for for ever.
