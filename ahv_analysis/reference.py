@@ -34,12 +34,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def graph() -> str:
-    """Mermaid flowchart of the control loop, dashed what adaptive cases add."""
+    """Mermaid flowchart of the control loop, dashed what adaptive cases and guidance add."""
     lines = ["```mermaid", "flowchart LR"]
     for topic in BY_NAME:
         speaker = sender(topic)
         for listener in listeners(topic):
-            dashed = NODES[speaker].adaptive or NODES[listener].adaptive
+            ends = NODES[speaker], NODES[listener]
+            dashed = any(end.adaptive or end.guided for end in ends)
             arrow = f"-. {topic} .->" if dashed else f"-- {topic} -->"
             lines.append(f"    {speaker} {arrow} {listener}")
     return "\n".join(lines) + "\n```\n"

@@ -11,11 +11,13 @@ from ahv_control.disturbance_learner import (
     start_learner,
     with_servos,
 )
+from ahv_control.guidance import Guidance
 from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_demand
 from ahv_control.intermediate_loop import IntermediateLoop, rate_command
 from ahv_control.law import Commands
 from ahv_control.newton_raphson import nominal_response, solve_surfaces
 from ahv_control.outer_loop import OuterLoop, attitude_command
+from ahv_control.reference import Reference, held
 from ahv_control.servo_model import (
     ServoModel,
     modelled_surfaces,
@@ -32,20 +34,39 @@ NEUTRAL = Surfaces(0.0, 0.0, 0.0)
 
 
 class FlightControl(NamedTuple):
-    """Settings of all loops; without a learner the inner loop is nominal."""
+    """Settings of all loops; without a learner the inner loop is nominal.
+
+    The guidance is before the law, which is told its reference: without one the outer and the
+    velocity loop hold their own altitude and speed.
+    """
 
     outer: OuterLoop
     intermediate: IntermediateLoop
     inner: InnerLoop
     velocity: VelocityLoop
     learner: LearnerSettings | None
+    guidance: Guidance | None = None
+
+
+def _told(settings: FlightControl, reference: Reference) -> Reference:
+    return reference
+
+
+def _own(settings: FlightControl) -> Reference:
+    return held(settings.outer.altitude, settings.velocity.speed)
+
+
+# followed(settings, reference): the reference, or where it is None what the loops hold
+followed = optional(_told, otherwise=_own)
 
 
 @elementwise
-def start(measured: Measurement, settings: FlightControl) -> tuple[LearnerState | None, Commands]:
+def start(
+    measured: Measurement, reference: Reference | None, settings: FlightControl
+) -> tuple[LearnerState | None, Commands]:
     """Learner, if there is one, and commands at the first measurement of a flight."""
     learner = first_learner(measured.state, settings.learner)
-    return learner, answer(measured.state, learner, NEUTRAL, settings)
+    return learner, answer(measured.state, reference, learner, NEUTRAL, settings)
 
 
 @elementwise
@@ -54,25 +75,31 @@ def step(
     before: Measurement,
     commands: Commands,
     measured: Measurement,
+    reference: Reference | None,
     settings: FlightControl,
 ) -> tuple[LearnerState | None, Commands]:
     """Learner and commands at a measurement; `commands` answered the one `before`."""
     learner = next_learner(
         learner, before.state, commands.surfaces, commands.rates, measured, settings.learner
     )
-    return learner, answer(measured.state, learner, commands.surfaces, settings)
+    return learner, answer(measured.state, reference, learner, commands.surfaces, settings)
 
 
 @elementwise
 def answer(
-    state: State, learner: LearnerState | None, previous: Surfaces, settings: FlightControl
+    state: State,
+    reference: Reference | None,
+    learner: LearnerState | None,
+    previous: Surfaces,
+    settings: FlightControl,
 ) -> Commands:
     """All commands for `state` with what was learned up to it, if there is a learner.
 
     The `previous` surfaces [rad] were commanded before.
     """
-    attitude = attitude_command(state, settings.outer)
-    rates = rate_command(state, attitude, settings.intermediate)
+    wanted = followed(settings, reference)
+    attitude = attitude_command(state, wanted, settings.outer)
+    rates = rate_command(state, attitude, wanted.psi_rate, settings.intermediate)
     if learner is None:
         demand = nominal_demand(state, rates, settings.inner)
     else:
@@ -80,7 +107,7 @@ def answer(
         learned = Learned(learner.X_a, learner.X_d, estimate)
         demand = adaptive_demand(state, rates, learned, settings.inner)
     surfaces, status = solve_surfaces(state, demand, previous, settings.inner.geometric)
-    throttle = throttle_command(state, surfaces, settings.velocity)
+    throttle = throttle_command(state, surfaces, wanted, settings.velocity)
     return Commands(attitude, rates, surfaces, throttle, status)
 
 

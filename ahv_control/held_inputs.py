@@ -18,6 +18,11 @@ def held_rates(last: Values | None, age: int) -> Values:
     return 0.0, 0.0, 0.0
 
 
+def held_reference(last: Values | None, age: int) -> Values | None:
+    """Reference: where it was, without its rates; none if there never was one."""
+    return None if last is None else (*last[:4], 0.0, 0.0, 0.0)
+
+
 def held_surfaces(last: Values | None, age: int) -> Values:
     """Surfaces [rad]: those that the plant holds, and then its safe command."""
     if last is None:

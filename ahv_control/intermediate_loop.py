@@ -17,8 +17,12 @@ class IntermediateLoop(NamedTuple):
 
 
 @elementwise
-def rate_command(state: State, command: Attitude, settings: IntermediateLoop) -> Rates:
+def rate_command(
+    state: State, command: Attitude, psi_rate: float, settings: IntermediateLoop
+) -> Rates:
     """Body rates P*, Q*, R* that close the attitude error at the gains, section 3.2.
+
+    `psi_rate` [rad/s] is that of the heading commanded, which the report takes as zero.
 
     The inverse of eq 2.4's matrix, written out: it has no singularity, unlike the matrix itself.
     """
@@ -26,7 +30,7 @@ def rate_command(state: State, command: Attitude, settings: IntermediateLoop) ->
     sin_theta, cos_theta = sin_cos(state.theta)
     phi_dot = settings.k_phi * (command.phi - state.phi)
     theta_dot = settings.k_theta * (command.theta - state.theta)
-    psi_dot = settings.k_psi * (command.psi - state.psi)
+    psi_dot = settings.k_psi * (command.psi - state.psi) + psi_rate
     return Rates(
         phi_dot - psi_dot * sin_theta,
         theta_dot * cos_phi + psi_dot * sin_phi * cos_theta,

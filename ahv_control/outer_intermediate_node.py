@@ -3,6 +3,7 @@
 
 import rclpy
 
+from ahv_control.held_inputs import held_reference
 from ahv_control.intermediate_loop import rate_command
 from ahv_control.outer_loop import attitude_command
 from ahv_control.parameters import (
@@ -10,16 +11,17 @@ from ahv_control.parameters import (
     intermediate_loop,
     outer_loop,
 )
+from ahv_control.reference import Reference, held
 from ahv_msgs_py.node.base_node import BaseNode
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
-from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND
+from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND, REFERENCE
 from ahv_plant.model.vectors import State
 
 
 class OuterIntermediateNode(BaseNode):
-    """Answers every state with an attitude and a body-rate command."""
+    """Answers every state, and its reference if guided, with attitude and body-rate command."""
 
     laws = (attitude_command, rate_command)
 
@@ -32,18 +34,21 @@ class OuterIntermediateNode(BaseNode):
     def prepare(self, settings: dict[str, Value]) -> None:
         """Make both loops."""
         self._outer = outer_loop(settings)
+        self._own = held(self._outer.altitude, 0.0)
         self._intermediate = intermediate_loop(settings)
 
     def start(self) -> None:
         """Open the topics."""
         self._send_attitude = self.sender(ATTITUDE_COMMAND)
         self._send_rates = self.sender(RATE_COMMAND)
-        self.receive_together(self._answer, {})
+        guided = {REFERENCE: held_reference} if self.settings["guided"] else {}
+        self.receive_together(self._answer, guided)
 
-    def _answer(self, stamp: int, values: Values) -> None:
+    def _answer(self, stamp: int, values: Values, reference: Values | None = None) -> None:
         state = State(*values)
-        attitude = attitude_command(state, self._outer)
-        self._send_rates(stamp, rate_command(state, attitude, self._intermediate))
+        wanted = Reference(*reference) if reference else self._own
+        attitude = attitude_command(state, wanted, self._outer)
+        self._send_rates(stamp, rate_command(state, attitude, wanted.psi_rate, self._intermediate))
         self._send_attitude(stamp, attitude)
 
 

@@ -6,6 +6,7 @@ from math import inf
 
 from ahv_control.disturbance_learner import LearnerSettings
 from ahv_control.error_dynamics import ErrorDynamics
+from ahv_control.guidance_parameters import GUIDED
 from ahv_control.inner_loop import InnerLoop
 from ahv_control.intermediate_loop import IntermediateLoop
 from ahv_control.outer_loop import OuterLoop
@@ -26,7 +27,15 @@ def _gain(name: str, default: float, description: str, in_flight: bool = True) -
 
 
 OUTER_INTERMEDIATE_PARAMETERS = (
-    Parameter("altitude", 24000.0, "altitude command h*", "m", 0.0, 48000.0, in_flight=True),
+    Parameter(
+        "altitude",
+        24000.0,
+        "altitude command h* without guidance",
+        "m",
+        0.0,
+        48000.0,
+        in_flight=True,
+    ),
     _gain("k_h", 0.01, "altitude gain, eq 3.1"),
     _gain("k_phi", 0.2, "roll-angle gain, section 3.2"),
     _gain("k_theta", 0.2, "pitch-angle gain, section 3.2"),
@@ -40,6 +49,16 @@ OUTER_INTERMEDIATE_PARAMETERS = (
         180.0,
         in_flight=True,
     ),
+    Parameter(
+        "climb_limit",
+        90.0,
+        "climb angle that is never exceeded by what is asked for; 90 is off",
+        "deg",
+        0.1,
+        90.0,
+        in_flight=True,
+    ),
+    GUIDED,
 )
 
 
@@ -107,8 +126,17 @@ LEARNER_PARAMETERS = (
     GEOMETRIC_ALTITUDE,
 )
 VELOCITY_PARAMETERS = (
-    Parameter("speed", 1786.4, "forward-speed command u*", "m/s", 0.0, 8000.0, in_flight=True),
+    Parameter(
+        "speed",
+        1786.4,
+        "forward-speed command u* without guidance",
+        "m/s",
+        0.0,
+        8000.0,
+        in_flight=True,
+    ),
     _gain("k_u", 0.01, "speed gain, eq 3.2"),
+    GUIDED,
     GEOMETRIC_ALTITUDE,
 )
 
@@ -118,7 +146,10 @@ ParameterValues = Mapping[str, Value]
 def outer_loop(values: ParameterValues) -> OuterLoop:
     """Outer-loop settings from checked parameters."""
     return OuterLoop(
-        float(values["altitude"]), float(values["k_h"]), float(values["alpha_limit"]) * RADIANS
+        float(values["altitude"]),
+        float(values["k_h"]),
+        float(values["alpha_limit"]) * RADIANS,
+        float(values["climb_limit"]) * RADIANS,
     )
 
 

@@ -3,6 +3,7 @@
 
 from typing import NamedTuple
 
+from ahv_control.reference import Reference
 from ahv_plant.model.aerodynamics import aerodynamic_coefficients, air_data, loads
 from ahv_plant.model.constants import GRAVITY, MAXIMUM_THRUST
 from ahv_plant.model.mass import centre_of_gravity
@@ -14,14 +15,19 @@ from ahv_plant.numerics.elementwise import elementwise
 class VelocityLoop(NamedTuple):
     """Settings of the velocity loop."""
 
-    speed: float  # [m/s] u*
+    speed: float  # [m/s] u* without guidance
     k_u: float  # [1/s]
     geometric: bool  # h is a geometric altitude
 
 
 @elementwise
-def throttle_command(state: State, surfaces: Surfaces, settings: VelocityLoop) -> float:
-    """Throttle sigma_T [-] that closes the error of the forward speed u at k_u, eq 3.2."""
+def throttle_command(
+    state: State, surfaces: Surfaces, reference: Reference, settings: VelocityLoop
+) -> float:
+    """Throttle sigma_T [-] that closes the error of the forward speed u at k_u, eq 3.2.
+
+    Beyond the report, the rate of u* is added to what the error asks for.
+    """
     air = air_data(state, settings.geometric)
     aero = loads(
         air, aerodynamic_coefficients(air, state, surfaces), centre_of_gravity(state.mass)
@@ -30,5 +36,6 @@ def throttle_command(state: State, surfaces: Surfaces, settings: VelocityLoop) -
     without_thrust = (
         state.R * state.v - state.Q * state.w - GRAVITY * sin_theta + aero.Fx / state.mass
     )
-    wanted = settings.k_u * (settings.speed - state.u) - without_thrust
+    acceleration = settings.k_u * (reference.speed - state.u) + reference.speed_rate
+    wanted = acceleration - without_thrust
     return limit_throttle(state.mass / MAXIMUM_THRUST * wanted)

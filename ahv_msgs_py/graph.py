@@ -21,6 +21,7 @@ class GraphNode(NamedTuple):
     sends: tuple[str, ...]
     controller: bool = False
     adaptive: bool = False  # flies with adaptive cases only
+    guided: bool = False  # flies with cases that have guidance only
 
     @property
     def node_class(self) -> type[Any]:
@@ -47,11 +48,21 @@ _NODES = (
         sends=("state", "surfaces", "truth"),  # the last two if its hardware is not ideal
     ),
     GraphNode(
+        "guidance",
+        "ahv_control.guidance_node",
+        "GuidanceNode",
+        "ahv_control.guidance_parameters.GUIDANCE_PARAMETERS",
+        hears=("state",),
+        sends=("reference",),
+        controller=True,
+        guided=True,
+    ),
+    GraphNode(
         "outer_intermediate",
         "ahv_control.outer_intermediate_node",
         "OuterIntermediateNode",
         "ahv_control.parameters.OUTER_INTERMEDIATE_PARAMETERS",
-        hears=("state",),
+        hears=("state", "reference"),
         sends=("attitude_command", "rate_command"),
         controller=True,
     ),
@@ -79,7 +90,7 @@ _NODES = (
         "ahv_control.velocity_node",
         "VelocityNode",
         "ahv_control.parameters.VELOCITY_PARAMETERS",
-        hears=("state", "surface_command"),
+        hears=("state", "reference", "surface_command"),
         sends=("throttle_command",),
         controller=True,
     ),
@@ -100,9 +111,13 @@ def case_nodes() -> list[str]:
     return [name for name, node in NODES.items() if node.sends]
 
 
-def controllers(adaptive: bool) -> list[str]:
+def controllers(adaptive: bool, guided: bool = False) -> list[str]:
     """Names of the controllers of a case, in the order in which they answer a state."""
-    return [name for name, node in NODES.items() if node.controller and adaptive >= node.adaptive]
+    return [
+        name
+        for name, node in NODES.items()
+        if node.controller and adaptive >= node.adaptive and guided >= node.guided
+    ]
 
 
 def sender(topic: str) -> str:

@@ -16,6 +16,7 @@ BASE = "base"  # a case of the package, of which a file says what differs
 SHARED = (
     BASE,
     "geometric_altitude",
+    "guided",
     "lambda",
     *(f"{gain}_{rate}" for gain in ("k", "k_s", "k_ap") for rate in "PQR"),
 )

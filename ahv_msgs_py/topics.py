@@ -64,6 +64,7 @@ FINITE = (-float_info.max, float_info.max)
 _DEFLECTION = (-0.7, 0.55)  # [rad] a little beyond the stops
 _THROTTLE = (0.0, 1.0)  # [-]
 _MASS = (1.0, 1e7)  # [kg]
+_RIGHT_ANGLE = 1.5708  # [rad] a little more, of a bank
 
 
 STATE = LoopTopic(
@@ -101,6 +102,16 @@ THROTTLE_COMMAND = LoopTopic(
     (_THROTTLE,),
     "throttle sigma_T of the velocity loop",
 )
+REFERENCE = LoopTopic(
+    "/ahv/reference",
+    NamedVector(
+        EARTH_FRAME,
+        ("altitude", "speed", "phi", "psi", "altitude_rate", "speed_rate", "psi_rate"),
+    ),
+    "m, m/s, rad, rad, m/s, m/s^2, rad/s",
+    ((-1e3, 1e5), (0.0, 1e4), (-_RIGHT_ANGLE, _RIGHT_ANGLE)) + (FINITE,) * 4,
+    "what the loops are to follow: h*, u*, phi*, psi* and rates, of flights with guidance",
+)
 NOMINAL_TOPICS = (STATE, ATTITUDE_COMMAND, RATE_COMMAND, SURFACE_COMMAND, THROTTLE_COMMAND)
 
 DISTURBANCE_ESTIMATE = LoopTopic(
@@ -134,7 +145,8 @@ TRUTH = LoopTopic(
     "true state, of flights whose hardware is not ideal; then /ahv/state is as measured",
 )
 HARDWARE_TOPICS = (SURFACES, TRUTH)
-LOOP_TOPICS = NOMINAL_TOPICS + LEARNER_TOPICS + HARDWARE_TOPICS
+SPECIAL_TOPICS = (REFERENCE, *HARDWARE_TOPICS)  # of flights with guidance, or with hardware
+LOOP_TOPICS = (*NOMINAL_TOPICS, REFERENCE, *LEARNER_TOPICS, *HARDWARE_TOPICS)
 BY_NAME = {relative(topic.name): topic for topic in LOOP_TOPICS}  # as the graph has them
 
 # Not of every step: once a second, and at the end of the flight.

@@ -100,7 +100,7 @@ def fly_study(
         later = loop_step(loop, number, truth, settings, None, None)
         if explicit:
             learner = explicit_step(loop, settings.learner)
-            commands = answer(later.plant.state, learner, before, settings)
+            commands = answer(later.plant.state, None, learner, before, settings)
             later = Loop(later.plant, learner, commands)
         loop = later
         state, learner, now = loop.plant.state, loop.memory, loop.commands.surfaces

@@ -91,7 +91,7 @@ def nose_comes_down(state: State, truth: Truth, before: Surfaces, delay: int) ->
 def beyond_elevons(campaign: Campaign, delay: int) -> set[int]:
     """Runs on vehicles that their elevons cannot save after a delay [steps] in level trim."""
     start, control = campaign.case.plant.initial, campaign.case.control
-    _, commands = start_law(Measurement(start, NEUTRAL), control)
+    _, commands = start_law(Measurement(start, NEUTRAL), None, control)
     truths = [Truth(dispersion=campaign.dispersion(run)) for run in range(campaign.runs)]
     return {
         run

@@ -16,6 +16,7 @@ from ahv_control.error_dynamics import ErrorDynamics, decay, error_decay
 from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_demand
 from ahv_control.newton_raphson import nominal_response
 from ahv_control.outer_loop import OuterLoop, attitude_command
+from ahv_control.reference import held as straight
 from ahv_plant.dispersion import Dispersion, draw_dispersion
 from ahv_plant.model.constants import DEGREES, RADIANS
 from ahv_plant.model.vectors import Rates, Surfaces
@@ -129,8 +130,9 @@ def test_with_nothing_learned_and_no_error_both_laws_are_one(state, command):
 @given(STATES, between(1.0, 8.0))
 def test_protection_keeps_the_commanded_angle_of_attack(state, limit):
     """Pitch command less climb angle is the angle of attack that the vehicle will settle at."""
-    free = attitude_command(state, OuterLoop(30000.0, 0.01, math.pi))
-    held = attitude_command(state, OuterLoop(30000.0, 0.01, limit * RADIANS))
+    reference = straight(30000.0, 1786.4)
+    free = attitude_command(state, reference, OuterLoop(0.0, 0.01, math.pi, math.pi / 2))
+    held = attitude_command(state, reference, OuterLoop(0.0, 0.01, limit * RADIANS, math.pi / 2))
     B = state.v * math.sin(state.phi) + state.w * math.cos(state.phi)
     climb_angle = state.theta - atan(B / state.u)
     assert abs(held.theta - climb_angle) * DEGREES <= limit + 1e-9

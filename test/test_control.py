@@ -18,10 +18,12 @@ from ahv_control.newton_raphson import (
     solve_surfaces,
 )
 from ahv_control.outer_loop import OuterLoop, attitude_command
+from ahv_control.reference import Reference, held
 from ahv_control.velocity_loop import VelocityLoop, throttle_command
 from ahv_plant.dispersion import NOMINAL
 from ahv_plant.model.constants import (
     DEGREES,
+    RADIANS,
     SURFACE_MAXIMUM,
     SURFACE_MINIMUM,
     THROTTLE_MAXIMUM,
@@ -37,6 +39,10 @@ pytestmark = pytest.mark.unit
 NEUTRAL = Surfaces(0.0, 0.0, 0.0)
 
 
+OUTER = OuterLoop(24000.0, 0.01, math.pi, math.pi / 2)
+VELOCITY = VelocityLoop(1786.4, 0.01, False)
+
+
 def inner_loop(gains):
     """Plain dynamic inversion with these gains."""
     dynamics = ErrorDynamics(gains, Rates(1.0, 1.0, 1.0), 1.0)
@@ -46,20 +52,21 @@ def inner_loop(gains):
 @given(STATES, between(20000.0, 30000.0))
 def test_the_commanded_pitch_gives_the_commanded_climb(state, altitude):
     """Eq 3.1 with the plus sign: at theta*, h_dot = k_h (h* - h)."""
-    command = attitude_command(state, OuterLoop(altitude, 0.01, math.pi))
+    command = attitude_command(state, held(altitude, 0.0), OUTER)
     pitched = state._replace(theta=command.theta)
     climb = state_rate(pitched, NEUTRAL, 0.2, 0.0, NOMINAL).h
     assert climb == pytest.approx(0.01 * (altitude - state.h), abs=1e-8)
     assert (command.phi, command.psi) == (0.0, 0.0)
 
 
-@given(STATES, degrees(30.0), degrees(30.0), degrees(30.0))
-def test_the_commanded_rates_give_the_commanded_euler_rates(state, phi, theta, psi):
+@given(STATES, degrees(30.0), degrees(30.0), degrees(30.0), degrees(1.0))
+def test_the_commanded_rates_give_the_commanded_euler_rates(state, phi, theta, psi, turn):
     gains = IntermediateLoop(0.1, 0.2, 0.3)
-    command = rate_command(state, Attitude(phi, theta, psi), gains)
+    command = rate_command(state, Attitude(phi, theta, psi), turn, gains)
     turning = state._replace(P=command.P, Q=command.Q, R=command.R)
     rate = state_rate(turning, NEUTRAL, 0.2, 0.0, NOMINAL)
-    expected = (0.1 * (phi - state.phi), 0.2 * (theta - state.theta), 0.3 * (psi - state.psi))
+    psi_dot = 0.3 * (psi - state.psi) + turn
+    expected = (0.1 * (phi - state.phi), 0.2 * (theta - state.theta), psi_dot)
     assert (rate.phi, rate.theta, rate.psi) == pytest.approx(expected, abs=1e-12)
 
 
@@ -130,7 +137,7 @@ def test_the_rate_error_decays_at_the_gains(P, Q, R, P_command, Q_command, R_com
 @given(STATES, SURFACES, between(1700.0, 1900.0))
 def test_the_throttle_gives_the_commanded_acceleration(state, surfaces, speed):
     """Eq 3.2: with sigma_T between its stops, u_dot = k_u (u* - u)."""
-    throttle = throttle_command(state, surfaces, VelocityLoop(speed, 0.01, False))
+    throttle = throttle_command(state, surfaces, held(0.0, speed), VELOCITY)
     assert THROTTLE_MINIMUM <= throttle <= THROTTLE_MAXIMUM
     rate = state_rate(state, surfaces, throttle, 0.0, NOMINAL).u
     wanted = 0.01 * (speed - state.u)
@@ -146,31 +153,57 @@ def test_at_trim_the_loops_ask_for_trim():
     from ahv_plant.trim import trim
 
     found = trim()
-    attitude = attitude_command(found.state, OuterLoop(24000.0, 0.01, math.pi))
+    attitude = attitude_command(found.state, held(24000.0, 0.0), OUTER)
     assert attitude.theta * DEGREES == pytest.approx(2.9442, abs=1e-4)
-    rates = rate_command(found.state, attitude, IntermediateLoop(0.2, 0.2, 0.2))
+    rates = rate_command(found.state, attitude, 0.0, IntermediateLoop(0.2, 0.2, 0.2))
     solution = nominal_surfaces(
         found.state, rates, found.surfaces, inner_loop(Rates(2.0, 2.0, 2.0))
     )
     assert solution.surfaces == pytest.approx(found.surfaces, abs=1e-9)
-    throttle = throttle_command(
-        found.state, solution.surfaces, VelocityLoop(found.state.u, 0.01, False)
-    )
+    throttle = throttle_command(found.state, solution.surfaces, held(0.0, found.state.u), VELOCITY)
     assert throttle == pytest.approx(found.throttle, abs=1e-9)
 
 
-@given(STATES, SURFACES)
-def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous):
-    outer = OuterLoop(24000.0, 0.01, math.pi)
+@given(STATES, SURFACES, between(0.0, 1.0))
+def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous, bank):
+    """Without a reference they hold their own altitude and speed."""
     intermediate = IntermediateLoop(0.2, 0.2, 0.2)
-    inner, velocity = inner_loop(Rates(2.0, 2.0, 2.0)), VelocityLoop(1786.4, 0.01, False)
-    control = FlightControl(outer, intermediate, inner, velocity, None)
-    commands = answer(state, None, previous, control)
-    assert commands.attitude == attitude_command(state, outer)
-    assert commands.rates == rate_command(state, commands.attitude, intermediate)
-    surfaces = nominal_surfaces(state, commands.rates, previous, inner)
-    assert (commands.surfaces, commands.status) == surfaces
-    assert commands.throttle == throttle_command(state, commands.surfaces, velocity)
+    inner = inner_loop(Rates(2.0, 2.0, 2.0))
+    control = FlightControl(OUTER, intermediate, inner, VELOCITY, None)
+    own = held(OUTER.altitude, VELOCITY.speed)
+    turning = Reference(24500.0, 1800.0, bank, 0.2, 3.0, 0.1, 0.01)
+    for reference, wanted in ((None, own), (own, own), (turning, turning)):
+        commands = answer(state, reference, None, previous, control)
+        assert commands.attitude == attitude_command(state, wanted, OUTER)
+        rates = rate_command(state, commands.attitude, wanted.psi_rate, intermediate)
+        assert commands.rates == rates
+        surfaces = nominal_surfaces(state, commands.rates, previous, inner)
+        assert (commands.surfaces, commands.status) == surfaces
+        throttle = throttle_command(state, commands.surfaces, wanted, VELOCITY)
+        assert commands.throttle == throttle
+
+
+@given(STATES, between(-4e4, 4e4), between(0.5, 10.0))
+def test_no_climb_angle_is_asked_for_beyond_its_limit(state, error, limit):
+    """Though the error of altitude asks for more than the whole speed could give."""
+    limited = OUTER._replace(climb_limit=limit * RADIANS)
+    command = attitude_command(state, held(state.h + error, 0.0), limited)
+    pitched = state._replace(theta=command.theta)
+    climb = state_rate(pitched, NEUTRAL, 0.2, 0.0, NOMINAL).h
+    B = state.v * math.sin(state.phi) + state.w * math.cos(state.phi)
+    assert abs(climb) <= math.hypot(state.u, B) * math.sin(limit * RADIANS) + 1e-6
+
+
+@given(STATES, between(-50.0, 50.0), between(-1.0, 1.0))
+def test_the_rates_of_the_reference_are_added_to_what_the_errors_ask_for(state, climb, faster):
+    reference = held(state.h, state.u)._replace(altitude_rate=climb, speed_rate=faster)
+    pitched = state._replace(theta=attitude_command(state, reference, OUTER).theta)
+    rate = state_rate(pitched, NEUTRAL, 0.2, 0.0, NOMINAL)
+    assert rate.h == pytest.approx(climb, abs=1e-8)
+    throttle = throttle_command(state, NEUTRAL, reference, VELOCITY)
+    if THROTTLE_MINIMUM < throttle < THROTTLE_MAXIMUM:
+        rate = state_rate(state, NEUTRAL, throttle, 0.0, NOMINAL)
+        assert rate.u == pytest.approx(faster, abs=1e-9)
 
 
 @given(SURFACES)

@@ -4,6 +4,7 @@
 import ast
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -58,12 +59,13 @@ def test_every_topic_of_the_loop_has_one_sender():
 
 def test_controllers_answer_in_the_order_of_the_loop():
     """None of them waits in a step for one that comes after it, but the learner for all."""
-    for adaptive in (False, True):
+    for adaptive, guided in product((False, True), repeat=2):
         heard = ["state"]
-        for name in controllers(adaptive):
+        names = controllers(adaptive, guided)
+        for name in names:
             if name != "disturbance_learner":
-                flown = [node.sends for node in map(NODES.get, controllers(adaptive))]
+                flown = [node.sends for node in map(NODES.get, names)]
                 missing = {*NODES[name].hears} & {topic for sent in flown for topic in sent}
                 assert missing <= {*heard}
             heard += NODES[name].sends
-    assert set(case_nodes()) == {"plant", *controllers(adaptive=True)}
+    assert set(case_nodes()) == {"plant", *controllers(adaptive=True, guided=True)}

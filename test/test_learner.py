@@ -271,7 +271,7 @@ def test_a_surface_at_its_stop_does_not_wind_the_learner_up():
     acceleration = abs(state.Q) / 0.4  # [rad/s^2] mean over the time
     assert acceleration > 0.6
     assert np.max(np.abs(estimate)) < 0.002 * acceleration
-    commands = answer(state, learner, stop, case.control)
+    commands = answer(state, None, learner, stop, case.control)
     assert all(math.isfinite(value) for value in commands.surfaces)
 
 

@@ -171,12 +171,12 @@ def launch(monkeypatch):
 
 
 ADDED = """    GraphNode(
-        "guidance",
+        "navigation",
         "ahv_control.velocity_node",
         "VelocityNode",
         "ahv_control.parameters.VELOCITY_PARAMETERS",
         hears=("state",),
-        sends=("reference",),
+        sends=("position",),
         controller=True,
     ),
 """
@@ -186,16 +186,16 @@ def test_one_entry_adds_a_node_to_all_that_start_nodes(monkeypatch, launch, sour
     graph = sources / "ahv_msgs_py" / "graph.py"
     graph.write_text(graph.read_text().replace("_NODES = (\n", f"_NODES = (\n{ADDED}"))
     given = handed_over(monkeypatch, sources, "bdist_wheel")
-    assert executables(given)["ahv-guidance"] == "ahv_msgs_py.program:guidance"
-    assert "build/launchers/guidance" in dict(given["data_files"])["lib/ahv"]
-    node = runpy.run_path(str(graph))["NODES"]["guidance"]
-    monkeypatch.setitem(NODES, "guidance", node)
-    assert set(launch()) == {"recorder", "plant", "guidance", *CONTROLLERS}
+    assert executables(given)["ahv-navigation"] == "ahv_msgs_py.program:navigation"
+    assert "build/launchers/navigation" in dict(given["data_files"])["lib/ahv"]
+    node = runpy.run_path(str(graph))["NODES"]["navigation"]
+    monkeypatch.setitem(NODES, "navigation", node)
+    assert set(launch()) == {"recorder", "plant", "navigation", *CONTROLLERS}
     case = tmp_path / "case.yaml"
-    case.write_text("/ahv/guidance: {ros__parameters: {speed: 1800.0}}")
+    case.write_text("/ahv/navigation: {ros__parameters: {speed: 1800.0}}")
     flown = load_case(str(case))
-    assert "guidance" in flown.controllers
-    assert flown.parameters["guidance"]["speed"] == 1800.0
+    assert "navigation" in flown.controllers
+    assert flown.parameters["navigation"]["speed"] == 1800.0
 
 
 LOCKSTEP = {"realtime": False, "autostart": True}
@@ -217,7 +217,7 @@ def test_launch_starts_a_process_per_node_from_one_case(launch, setup):
 
 def test_launch_adds_the_learner_to_adaptive_cases(launch):
     nodes = launch(case="neuro_adaptive_di")
-    assert set(nodes) == set(NODES)
+    assert set(nodes) == set(NODES) - {"guidance"}
     assert nodes["plant"].parameters[1:] == [LOCKSTEP | {"listeners": 5}]
 
 

@@ -93,7 +93,9 @@ def test_the_graph_that_flies_is_the_one_that_is_drawn(domain):
         wait_until(as_many_as_are_drawn, "the observer knows of all ends")
 
     try:
-        case = load_case("neuro_adaptive_di", {"duration": 1.0}, hardware="typical")
+        case = load_case(
+            "neuro_adaptive_di", {"duration": 1.0}, hardware="typical", profile="altitude_step"
+        )
         fly_graph(case, None, domain=domain, progress=look)
     finally:
         observer.destroy_node()

@@ -33,7 +33,8 @@ def test_a_flight_of_nodes_alone_is_replayed_by_what_they_told(
     fly_graph(case, tmp_path / "bag", domain=domain)
     told = json.loads(ahv("bag", "info", tmp_path / "bag", "--json").stdout)
     assert told["case"] == "unnamed" and told["planned_s"] == 1.0
-    flown = case.parameters | {"plant": case.parameters["plant"] | {"listeners": 5}}
+    flown = {name: case.parameters[name] for name in ("plant", *case.controllers)}
+    flown["plant"] |= {"listeners": 5}
     assert told["notes"]["parameters"] == flown
     assert "numba" in told["notes"]["versions"]
     result = json.loads(ahv("replay", tmp_path / "bag", "--json").stdout)

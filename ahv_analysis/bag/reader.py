@@ -31,6 +31,7 @@ from ahv_msgs_py.topics import (
     NAMESPACE,
     NOMINAL_TOPICS,
     RATE_COMMAND,
+    REFERENCE,
     SETTINGS,
     STATE,
     SURFACE_COMMAND,
@@ -300,6 +301,7 @@ def flight_of(bag: Bag) -> FlightRecord:
         bag.surfaces_lost_at,
         None if truth is None else rows[STATE],
         rows.get(SURFACES),
+        rows.get(REFERENCE),
     )
 
 

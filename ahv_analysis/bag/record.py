@@ -15,6 +15,7 @@ from ahv_control.disturbance_learner import LearnerState, disturbance_estimate
 from ahv_control.law import Commands
 from ahv_control.learner_message import learner_values
 from ahv_control.newton_raphson import SolverStatus, nominal_response
+from ahv_control.reference import Reference
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import LEARNER_NAMES
 from ahv_plant.model.aerodynamics import AirData, air_data
@@ -55,6 +56,7 @@ class FlightRecord:
     positions: Rows | None = (
         None  # (N+1, 3) [rad] of the surfaces as measured, None if as commanded
     )
+    references: Rows | None = None  # (N+1, 7) in the order of Reference, None without guidance
 
     @property
     def steps(self) -> int:
@@ -83,6 +85,7 @@ class FlightRecord:
                 self.surfaces_lost_at,
                 None if self.measured is None else self.measured[part],
                 None if self.positions is None else self.positions[part],
+                None if self.references is None else self.references[part],
             )
 
     def column(self, name: str) -> Array:
@@ -166,6 +169,7 @@ class Step(NamedTuple):
     learner: LearnerState | None
     ended_early: str  # why this is the last step before its time; empty if it is not
     measured: Measurement | None  # None with ideal hardware: the state, and surfaces as commanded
+    reference: Reference | None = None  # that is followed; None where nothing guides
 
     @property
     def told(self) -> State:
@@ -184,8 +188,8 @@ def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     stamps, throttles = array("q"), array("d")
     states, learners = GrowingRows(len(State._fields)), GrowingRows(len(LEARNER_NAMES))
     attitudes, rates, surfaces, estimates, positions = (GrowingRows(3) for _ in range(5))
-    measured = GrowingRows(len(State._fields))
-    adaptive, equipped, lost_at = False, False, None
+    measured, references = GrowingRows(len(State._fields)), GrowingRows(len(Reference._fields))
+    adaptive, equipped, guided, lost_at = False, False, False, None
     for step in steps:
         stamps.append(step.stamp)
         if lost_at is None and step.commands.status == SolverStatus.SINGULAR:
@@ -203,6 +207,9 @@ def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
             equipped = True
             measured.append(step.measured.state)
             positions.append(step.measured.surfaces)
+        if step.reference is not None:
+            guided = True
+            references.append(step.reference)
     return FlightRecord(
         np.frombuffer(stamps, np.int64),
         states.rows(),
@@ -216,4 +223,5 @@ def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
         lost_at,
         measured.rows() if equipped else None,
         positions.rows() if equipped else None,
+        references.rows() if guided else None,
     )

@@ -40,10 +40,10 @@ from ahv_analysis.errors import BagError
 from ahv_msgs_py.layout import NANOSECONDS
 from ahv_msgs_py.topics import (
     FLIGHT,
-    HARDWARE_TOPICS,
     LEARNER_TOPICS,
     NOMINAL_TOPICS,
     QUEUE_DEPTH,
+    SPECIAL_TOPICS,
     VIEWER_TOPICS,
 )
 
@@ -61,7 +61,7 @@ _QOS = Qos(
 )
 ONE_PUBLISHER = 1
 LONGEST = 1000  # messages of a topic in one chunk: what a damaged chunk takes with it
-_HARDWARE = {topic.name: topic.layout.type_name for topic in HARDWARE_TOPICS}
+_SPECIAL = {topic.name: topic.layout.type_name for topic in SPECIAL_TOPICS}
 _Chunk = tuple[bytes, Index]  # message records, and where they are
 _STAMP = np.dtype([("seconds", "<i4"), ("nanoseconds", "<u4")])
 
@@ -135,7 +135,7 @@ class BagWriter:
             self._room(loop.name, loop.layout.type_name, 4)()
         for viewer in VIEWER_TOPICS:
             self._room(viewer.name, viewer.type_name, viewer.stamp_offset)()
-        self.counts |= dict.fromkeys(_HARDWARE, 0)
+        self.counts |= dict.fromkeys(_SPECIAL, 0)
 
     def _room(self, name: str, type_name: str, stamp_offset: int | None) -> Callable[[], None]:
         """Make room for the messages of a topic; what is returned files the topic itself."""
@@ -163,8 +163,8 @@ class BagWriter:
         """
         if self.failure is not None:
             raise self.failure
-        if topic not in self._inboxes:  # only a flight whose hardware is not ideal has it
-            self._do(self._room(topic, _HARDWARE[topic], 4))
+        if topic not in self._inboxes:  # only some flights have it
+            self._do(self._room(topic, _SPECIAL[topic], 4))
         inbox = self._inboxes[topic]
         inbox.messages.extend(messages)
         inbox.publishers.extend(publishers or [ONE_PUBLISHER] * len(messages))

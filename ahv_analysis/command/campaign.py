@@ -18,14 +18,15 @@ import typer
 from ahv_analysis.command.console import (
     HardwareChoice,
     Json,
+    ProfileChoice,
     Reported,
     UsageError,
     check_domain,
-    hardware_words,
     integer_option,
     print_json,
     progress_bar,
     show_table,
+    words_of,
 )
 from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
@@ -87,6 +88,7 @@ def fly(
         bool, typer.Option("--random-starts", help="Section 3.5.2's random starts as well.")
     ] = False,
     hardware: HardwareChoice = None,
+    profile: ProfileChoice = None,
     draws: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="What is drawn besides: distributions in a YAML file."),
@@ -110,9 +112,10 @@ def fly(
     for one in levels:
         if not 0.0 <= one <= HIGHEST_LEVEL:
             raise UsageError(f"level {one:g} is outside 0 to {HIGHEST_LEVEL:g}")
-    case = load_case(controller + ("_protected" if protected else ""), hardware=hardware)
+    name = controller + ("_protected" if protected else "")
+    case = load_case(name, hardware=hardware, profile=profile)
     drawn = None if draws is None else load_draws(draws)
-    words = [case.name, *hardware_words(hardware), *([] if draws is None else [draws.stem])]
+    words = [case.name, *words_of(hardware, profile, None if draws is None else draws.stem)]
     folder = out or Path("campaigns") / "-".join(words)
     summaries = []
     with executor_of(workers, dask) as pool:
@@ -248,7 +251,7 @@ def table(
 
     started = time.perf_counter()
     total = total_runs(runs)
-    words = hardware_words(hardware)
+    words = words_of(hardware)
     folder = out or Path("campaigns") / "-".join(["table", *words])
     with (
         executor_of(workers, dask) as pool,

@@ -46,6 +46,14 @@ HardwareChoice = Annotated[
         help="What the vehicle moves and measures with: ideal, typical, poor, or a YAML file.",
     ),
 ]
+ProfileChoice = Annotated[
+    str | None,
+    typer.Option(
+        "--profile",
+        metavar="NAME|FILE",
+        help="What is flown, instead of one altitude and speed: a name, or a YAML file.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
@@ -57,9 +65,9 @@ def number(text: str) -> float:
         raise typer.BadParameter(f"{text!r} is not a number") from None
 
 
-def hardware_words(choice: str | None) -> list[str]:
-    """Name of the hardware that was chosen, for folders and titles; none if it is the case's."""
-    return [] if choice is None else [Path(choice).stem]
+def words_of(*choices: str | None) -> list[str]:
+    """Names of hardware and profile, for folders and titles; none for those of the case."""
+    return [Path(choice).stem for choice in choices if choice is not None]
 
 
 def number_option(unit: str, meaning: str) -> Any:

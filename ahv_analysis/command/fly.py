@@ -17,6 +17,7 @@ from typer.core import TyperCommand
 from ahv_analysis.command.console import (
     HardwareChoice,
     Json,
+    ProfileChoice,
     Reported,
     UsageError,
     check_domain,
@@ -35,14 +36,15 @@ from ahv_plant.model.constants import STEP, STEP_NS
 
 
 class CaseCommand(TyperCommand):
-    """A command whose help lists the cases."""
+    """A command whose help lists the cases and profiles."""
 
     def format_epilog(self, context: Any, formatter: Any) -> None:
-        """List the cases."""
-        from ahv_analysis.flight.case import case_names
+        """List the cases and the profiles."""
+        from ahv_analysis.flight.case import case_names, profile_names
 
-        with formatter.section("Cases"):
-            formatter.write_text(", ".join(case_names()))
+        for title, names in (("Cases", case_names()), ("Profiles", profile_names())):
+            with formatter.section(title):
+                formatter.write_text(", ".join(names))
 
 
 NAMES = re.compile("(/[A-Za-z_][A-Za-z0-9_]*)+")  # as ROS has them
@@ -88,6 +90,7 @@ def fly(
         ),
     ] = None,
     hardware: HardwareChoice = None,
+    profile: ProfileChoice = None,
     seed: Annotated[int, integer_option("Seed of the campaign of a draw.")] = 0,
     run: Annotated[int, integer_option("Number of the run of a draw.")] = 0,
     as_json: Json = False,
@@ -117,7 +120,7 @@ def fly(
     changes, draw = _dispersion(dispersion, seed, run, namespace)
     if duration is not None:
         changes["duration"] = duration
-    flight = load_case(case, changes, draw, namespace, hardware)
+    flight = load_case(case, changes, draw, namespace, hardware, profile)
     folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     bag, summary_file = folder / "bag", folder / "summary.json"
     for path in (bag, summary_file):

@@ -14,12 +14,13 @@ from ahv_analysis.command.campaign import CORES, Dask, Seed, Workers, executor_o
 from ahv_analysis.command.console import (
     HardwareChoice,
     Json,
+    ProfileChoice,
     Reported,
     UsageError,
-    hardware_words,
     integer_option,
     print_json,
     progress_bar,
+    words_of,
 )
 from ahv_analysis.interrupt import interrupted_says, signals_wait
 from ahv_analysis.ranges import RANGE
@@ -44,6 +45,7 @@ def map_rates(
     ],
     y: Annotated[str, typer.Option("--y", metavar=AXIS, help="Vertical axis.")],
     hardware: HardwareChoice = None,
+    profile: ProfileChoice = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -80,12 +82,12 @@ def map_rates(
     if by_axis and level is not None:
         raise UsageError("--level and an axis both set the level")
     chosen = float(LEVEL.check("map", LEVEL.default if level is None else level))
-    name, given = read_case(case, hardware=hardware)
+    name, given = read_case(case, hardware=hardware, profile=profile)
     parameters: Given = given
     for places, value in changes.values():
         parameters = with_value(parameters, places, value)
     flown = Map(name, parameters, *axes, chosen, runs, seed)
-    words = hardware_words(hardware)
+    words = words_of(hardware, profile)
     folder = out or Path("maps") / "-".join([name, *words])
     total = runs * len(flown.campaigns)
     started = time.perf_counter()
@@ -100,7 +102,8 @@ def map_rates(
     wall = time.perf_counter() - started
     described: dict[str, Any] = {
         "case": name,
-        "hardware": words[0] if words else None,
+        "hardware": next(iter(words_of(hardware)), None),
+        "profile": next(iter(words_of(profile)), None),
         "set": {of: value for of, (_, value) in changes.items()},
         "level": None if by_axis else chosen,
         "seed": seed,
@@ -131,6 +134,8 @@ def assumptions(described: dict[str, Any]) -> str:
     parts = [described["case"]]
     if described["hardware"] is not None:
         parts.append(f"{described['hardware']} hardware")
+    if described["profile"] is not None:
+        parts.append(f"profile {described['profile']}")
     parts += [f"{name} = {json.dumps(value)}" for name, value in described["set"].items()]
     if described["level"] is not None:
         parts.append(f"level {described['level']:g}")

@@ -49,10 +49,10 @@ from ahv_msgs_py.topics import (
     DIAGNOSTICS,
     FLIGHT,
     FLOWN,
-    HARDWARE_TOPICS,
     LOOP_TOPICS,
     NAMESPACE,
     RATE_COMMAND,
+    SPECIAL_TOPICS,
     STATE,
     SURFACE_COMMAND,
     THROTTLE_COMMAND,
@@ -70,10 +70,10 @@ HEARD_AGAIN = 0.6  # [s] of flight in which a node is, that goes on or has joine
 LONGEST_SILENCE = 5.0  # [s] for which that is waited for
 PER_FLIGHT = 75  # injections, so that a flight stays within its 150 s
 CONTROLLERS = tuple(controllers(adaptive=True))
-RECEIVED = tuple(  # on ideal hardware, which the case has
+RECEIVED = tuple(  # without guidance and on ideal hardware, as the case flies
     topic.name
     for name, topic in BY_NAME.items()
-    if listeners(name) and topic not in HARDWARE_TOPICS
+    if listeners(name) and topic not in SPECIAL_TOPICS
 )
 COMMANDS = tuple(name for name in RECEIVED if name != STATE.name)
 # What somebody must report, any one of them, by the kind of the injection.

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
+from ahv_control.guidance import Guidance, conditions
+from ahv_control.guidance_parameters import GUIDED, guidance
 from ahv_control.parameters import (
     COMMANDED,
     LEARNER_PARAMETERS,
@@ -38,6 +40,11 @@ HARDWARE |= {
     if parameter.name.startswith(("observer_surfaces", "servo_model."))
 }
 
+GUIDED_NODES = [
+    name
+    for name in case_nodes()
+    if any(parameter is GUIDED for parameter in NODES[name].parameters)
+]
 TRUE = ("dispersion.", "disturbance.", "wind.", "gust.", "turbulence.")  # of the plant alone
 
 
@@ -62,7 +69,10 @@ class Case(NamedTuple):
     @property
     def controllers(self) -> list[str]:
         """Names of the controller nodes that fly it."""
-        return controllers(adaptive=self.control.learner is not None)
+        control = self.control
+        return controllers(
+            adaptive=control.learner is not None, guided=control.guidance is not None
+        )
 
 
 def notes(case: Case) -> str:
@@ -74,9 +84,12 @@ def notes(case: Case) -> str:
 
 
 def read_case(
-    name: str, namespace: str = NAMESPACE, hardware: str | None = None
+    name: str,
+    namespace: str = NAMESPACE,
+    hardware: str | None = None,
+    profile: str | None = None,
 ) -> tuple[str, dict[str, dict[str, object]]]:
-    """Name of a case, and its parameters by node as the files of case and hardware give them."""
+    """Name of a case, and its parameters by node as case, hardware and profile give them."""
     path = Path(name)
     if path.suffix not in (".yaml", ".yml") and name in case_names():
         path = case_path(name)
@@ -88,6 +101,9 @@ def read_case(
     if hardware is not None:
         for node, values in load_hardware(hardware, namespace).items():
             given[node] |= values
+    if profile is not None:
+        for node, values in load_profile(profile, namespace).items():
+            given[node] |= values
     return path.stem, given
 
 
@@ -97,14 +113,16 @@ def load_case(
     draw: Draw | None = None,
     namespace: str = NAMESPACE,
     hardware: str | None = None,
+    profile: str | None = None,
 ) -> Case:
     """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
 
     `plant` replaces parameters of the plant: a dispersion, another start or duration; `draw` says
     where the dispersion comes from, if it was drawn. The file is read as nodes in `namespace` do.
-    `hardware` is a name of config/hardware, or a file, whose parameters stand above the case's.
+    `hardware` is a name of config/hardware, or a file, and `profile` one of config/profiles;
+    their parameters stand above the case's.
     """
-    name, given = read_case(name, namespace, hardware)
+    name, given = read_case(name, namespace, hardware, profile)
     given["plant"] |= plant or {}
     if draw is not None:  # the noise is that of the run, as in the campaign
         given["plant"] |= {"noise.seed": draw.seed, "noise.run": draw.run}
@@ -113,18 +131,21 @@ def load_case(
 
 def hardware_names() -> list[str]:
     """Hardware that comes with the package."""
-    return sorted(path.stem for path in (config_folder() / "hardware").glob("*.yaml"))
+    return _names("hardware")
+
+
+def profile_names() -> list[str]:
+    """Profiles that come with the package: what to fly, by time or by waypoints."""
+    return _names("profiles")
+
+
+def _names(folder: str) -> list[str]:
+    return sorted(path.stem for path in (config_folder() / folder).glob("*.yaml"))
 
 
 def load_hardware(name: str, namespace: str = NAMESPACE) -> dict[str, dict[str, object]]:
     """Parameters by node of a name in config/hardware, or of a file that says nothing else."""
-    path = Path(name)
-    if path.suffix not in (".yaml", ".yml") and name in hardware_names():
-        path = config_folder() / "hardware" / f"{name}.yaml"
-    elif not path.is_file():
-        raise ParameterError(
-            f"hardware {name!r} is neither a YAML file nor one of {', '.join(hardware_names())}"
-        )
+    path = _file_of(name, "hardware", "hardware")
     given = read_case_file(path, namespace)
     for node, values in given.items():
         for parameter in values:
@@ -135,6 +156,35 @@ def load_hardware(name: str, namespace: str = NAMESPACE) -> dict[str, dict[str, 
                     "observer_surfaces and servo_model of the disturbance_learner"
                 )
     return given
+
+
+def load_profile(name: str, namespace: str = NAMESPACE) -> dict[str, dict[str, object]]:
+    """Parameters by node of a name in config/profiles, or of a file that says nothing else."""
+    path = _file_of(name, "profile", "profiles")
+    given = read_case_file(path, namespace)
+    for node, values in given.items():
+        for parameter in values:
+            known = node == "guidance" or (node, parameter) == ("plant", "duration")
+            if not known and parameter != GUIDED.name:
+                raise ParameterError(
+                    f"{path.name}: {node}: {parameter} has no place in a profile; valid are "
+                    "parameters of guidance, guided of all nodes, and duration of the plant"
+                )
+    if given["guidance"].get(GUIDED.name) is not True:
+        raise ParameterError(f"{path.name}: a profile must have guided: true for all nodes")
+    return given
+
+
+def _file_of(name: str, kind: str, folder: str) -> Path:
+    """File of a name in a folder of config, or of a path."""
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml") and name in _names(folder):
+        return config_folder() / folder / f"{name}.yaml"
+    if not path.is_file():
+        raise ParameterError(
+            f"{kind} {name!r} is neither a YAML file nor one of {', '.join(_names(folder))}"
+        )
+    return path
 
 
 def dispersion_parameters(dispersion: Dispersion) -> dict[str, object]:
@@ -163,6 +213,10 @@ def make_case(
         node: check_parameters(f"{name}: {node}", NODES[node].parameters, given.get(node, {}))
         for node in case_nodes()
     }
+    outer, velocity = parameters["outer_intermediate"], parameters["velocity"]
+    held = {"altitude": outer["altitude"], "speed": velocity["speed"]}
+    guiding = parameters["guidance"]
+    guiding |= held | {key: guiding[key] for key in held if key in given.get("guidance", {})}
     plant = plant_settings(parameters["plant"])
     if plant.hardware is None:  # surfaces are where they are commanded to be: nobody measures them
         learner = parameters["disturbance_learner"]
@@ -176,8 +230,29 @@ def make_case(
         inner_loop(parameters["inner_loop"]),
         velocity_loop(parameters["velocity"]),
         learner_settings(parameters["disturbance_learner"]) if adaptive else None,
+        _guidance(name, parameters, plant),
     )
     return Case(name, parameters, plant, control, draw)
+
+
+def _guidance(
+    name: str, parameters: Mapping[str, Mapping[str, Value]], plant: PlantSettings
+) -> Guidance | None:
+    """Guidance of a case, None without; ParameterError where what it leads to cannot be flown."""
+    guided = {node: parameters[node][GUIDED.name] for node in GUIDED_NODES}
+    if len(set(guided.values())) > 1:
+        raise ParameterError(
+            f"{name}: guided is {guided}, but must be the same for all of them: set it by /**"
+        )
+    made = guidance(parameters["guidance"])
+    if not guided["guidance"]:
+        return None
+    for place, altitude, speed in conditions(made):
+        try:
+            check_flight_condition(altitude, speed, plant.initial.mass, plant.truth.geometric)
+        except ValueError as error:
+            raise ParameterError(f"guidance: {place}: {error}") from error
+    return made
 
 
 def _check_commands(parameters: Mapping[str, Mapping[str, Value]], plant: PlantSettings) -> None:

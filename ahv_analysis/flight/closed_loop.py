@@ -1,5 +1,5 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""The closed loop: flight control and true vehicle, one step at a time.
+"""The closed loop: guidance, flight control and true vehicle, one step at a time.
 
 Element-wise, so that it is the same in plain Python, compiled, and in lanes. Whoever flies, calls
 `start_loop` and `loop_step` and looks at what is between them: the outcome of a run, a trajectory
@@ -10,7 +10,10 @@ from typing import NamedTuple
 
 from ahv_control.disturbance_learner import LearnerState
 from ahv_control.flight_control import FlightControl, start, step
+from ahv_control.guidance import guidance_step, start_guidance
 from ahv_control.law import Commands
+from ahv_control.reference import Reference
+from ahv_control.route import RouteState
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.noise import Draws
 from ahv_plant.model.vectors import Controls, State
@@ -24,6 +27,8 @@ class Loop(NamedTuple):
     plant: Plant
     memory: LearnerState | None  # of the flight control
     commands: Commands  # that answer the measurement
+    route: RouteState | None  # memory of a guidance by waypoints
+    reference: Reference | None  # that the commands follow; None where nothing guides
 
 
 @elementwise
@@ -32,8 +37,9 @@ def start_loop(
 ) -> Loop:
     """Loop at the first state of a flight; without a rig the hardware is ideal."""
     plant = start_plant(state, truth, draws, rig)
-    memory, commands = start(plant.measured, control)
-    return Loop(plant, memory, commands)
+    route, reference = start_guidance(plant.measured.state, 0, control.guidance)
+    memory, commands = start(plant.measured, reference, control)
+    return Loop(plant, memory, commands, route, reference)
 
 
 @composition
@@ -49,5 +55,10 @@ def loop_step(
     held = loop.commands
     command = Controls(held.surfaces, held.throttle)
     plant = plant_step(loop.plant, command, number, truth, draws, rig)
-    memory, commands = step(loop.memory, loop.plant.measured, held, plant.measured, control)
-    return Loop(plant, memory, commands)
+    route, reference = guidance_step(
+        loop.route, plant.measured.state, number + 1, control.guidance
+    )
+    memory, commands = step(
+        loop.memory, loop.plant.measured, held, plant.measured, reference, control
+    )
+    return Loop(plant, memory, commands, route, reference)

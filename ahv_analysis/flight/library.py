@@ -21,6 +21,7 @@ from ahv_msgs_py.topics import (
     DISTURBANCE_ESTIMATE,
     LEARNER,
     RATE_COMMAND,
+    REFERENCE,
     STATE,
     SURFACE_COMMAND,
     SURFACES,
@@ -54,7 +55,15 @@ def fly(case: Case) -> Iterator[Step]:
 def _step(number: int, loop: Loop, ended_early: str, equipped: Rig | None) -> Step:
     plant = loop.plant
     measured = None if equipped is None else plant.measured
-    return Step(number * STEP_NS, plant.state, loop.commands, loop.memory, ended_early, measured)
+    return Step(
+        number * STEP_NS,
+        plant.state,
+        loop.commands,
+        loop.memory,
+        ended_early,
+        measured,
+        loop.reference,
+    )
 
 
 def fly_library(
@@ -95,6 +104,8 @@ def write_step(bag: BagWriter, step: Step) -> None:
         (SURFACE_COMMAND, answers.surfaces),
         (THROTTLE_COMMAND, (answers.throttle,)),
     ]
+    if step.reference is not None:
+        messages.append((REFERENCE, step.reference))
     if step.learner is not None:
         messages.append((LEARNER, learner_values(step.learner)))
         messages.append((DISTURBANCE_ESTIMATE, estimate_values(step.estimate)))

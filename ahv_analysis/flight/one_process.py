@@ -27,6 +27,7 @@ from ahv_msgs_py.topics import (
     LEARNER_TOPICS,
     NAMESPACE,
     NOMINAL_TOPICS,
+    REFERENCE,
     STATE,
     LoopTopic,
 )
@@ -46,6 +47,7 @@ def loop_topics(case: Case) -> Sequence[LoopTopic]:
     """Topics of the control loop of a case."""
     return (
         *NOMINAL_TOPICS,
+        *((REFERENCE,) if case.control.guidance is not None else ()),
         *(LEARNER_TOPICS if case.control.learner is not None else ()),
         *(HARDWARE_TOPICS if case.plant.hardware is not None else ()),
     )

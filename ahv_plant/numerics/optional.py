@@ -24,8 +24,8 @@ def optional(
 
     Then the answer is that of `otherwise` to all arguments but the last, or None.
     """
-    compiled = elementwise(function)
-    plain = None if otherwise is None else elementwise(otherwise)
+    compiled = _compiled(function)
+    plain = None if otherwise is None else _compiled(otherwise)
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
@@ -43,6 +43,11 @@ def optional(
         return lambda *arguments: plain(*arguments[:-1])
 
     return call
+
+
+def _compiled(function: Callable[..., Result]) -> Callable[..., Result]:
+    """The function, compiled if it is not yet."""
+    return function if hasattr(function, "py_func") else elementwise(function)
 
 
 def changed_by(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,0 +1,231 @@
+# Copyright 2026 ahv developers, Apache-2.0
+"""References by time and by waypoints: what they are, and that the loops follow them."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ahv_analysis.bag.reader import read_bag
+from ahv_analysis.bag.record import record_of
+from ahv_analysis.campaign.campaign import Campaign, fly_again, fly_runs
+from ahv_analysis.flight.case import load_case, profile_names
+from ahv_analysis.flight.library import fly
+from ahv_analysis.flight.one_process import fly_graph
+from ahv_analysis.replay.inputs import read_recording
+from ahv_analysis.replay.replay import replay
+from ahv_control.guidance import guidance_step, start_guidance
+from ahv_control.guidance_parameters import GUIDANCE_PARAMETERS, guidance
+from ahv_msgs_py.parameters import ParameterError, check_parameters
+from ahv_plant.model.atmosphere import atmosphere
+from ahv_plant.model.constants import DEGREES, GRAVITY, STEP
+from test.flights import CRUISE, between
+
+
+def guided(**values):
+    """Guidance of these parameters; the others are as by default."""
+    return guidance(check_parameters("guidance", GUIDANCE_PARAMETERS, values))
+
+
+def reference_at(time, made):
+    """Reference of a guidance by time."""
+    return start_guidance(CRUISE, round(time / STEP), made)[1]
+
+
+@pytest.mark.unit
+def test_a_step_is_there_at_its_time_and_a_ramp_is_linear():
+    made = guided(altitude_changes="24500 at 10; 24000 at 20 over 50", shape="ramp")
+    for time, altitude in ((9.99, 24000.0), (10.0, 24500.0), (20.0, 24500.0), (45.0, 24250.0)):
+        assert reference_at(time, made).altitude == pytest.approx(altitude, abs=1e-9)
+    assert reference_at(70.0, made).altitude == 24000.0
+
+
+@pytest.mark.unit
+@given(between(10.0, 100.0), between(-3000.0, 3000.0), st.integers(1, 9))
+def test_a_smooth_transition_is_the_quintic_of_least_jerk(over, change, tenth):
+    """Its coefficients follow from the six conditions at its ends, solved here by numpy."""
+    steps = round(over / STEP)
+    made = guided(
+        altitude_changes=f"{24000.0 + change!r} at 10 over {steps * STEP!r}", feed_forward=True
+    )
+    powers = np.arange(6)
+    at_ends = [[0.0**p for p in powers], [1.0] * 6]
+    slopes = [[p * 0.0 ** max(p - 1, 0) for p in powers], powers]
+    curves = [[p * (p - 1) * 0.0 ** max(p - 2, 0) for p in powers], powers * (powers - 1)]
+    conditions = np.array([*at_ends, *slopes, *curves], float)
+    quintic = np.polynomial.Polynomial(np.linalg.solve(conditions, [0, 1, 0, 0, 0, 0]))
+    number = steps * tenth // 10
+    share = number / steps
+    reference = start_guidance(CRUISE, 1000 + number, made)[1]
+    assert reference.altitude == pytest.approx(24000.0 + change * quintic(share), abs=1e-6)
+    rate = change * quintic.deriv()(share) / (steps * STEP)
+    assert reference.altitude_rate == pytest.approx(rate, abs=1e-6)
+
+
+@pytest.mark.unit
+@pytest.mark.parametrize("keeps", ["Mach number", "dynamic pressure"])
+def test_a_climb_keeps_what_it_is_to_keep_and_sends_the_rate_of_the_speed(keeps):
+    made = guided(altitude_changes="27000 at 0 over 300", keeps=keeps, feed_forward=True)
+    kept = []
+    for time in (0.0, 100.0, 200.0, 300.0):
+        reference = reference_at(time, made)
+        air = atmosphere(reference.altitude, False)
+        by_mach = reference.speed / air.sound_speed
+        by_pressure = math.sqrt(air.density) * reference.speed
+        kept.append(by_mach if keeps == "Mach number" else by_pressure)
+    assert kept == pytest.approx([kept[0]] * 4, rel=1e-12)
+    before, after = (reference_at(time, made).speed for time in (149.5, 150.5))
+    assert reference_at(150.0, made).speed_rate == pytest.approx(after - before, rel=1e-3)
+
+
+@pytest.mark.unit
+def test_a_turn_is_banked_as_lift_turns_the_vehicle_and_no_more_than_its_limit():
+    """tan phi* = V psi_dot / g."""
+    ramp = {"heading_changes": "10 at 0 over 100", "shape": "ramp", "feed_forward": True}
+    reference = reference_at(50.0, guided(**ramp))
+    turn = 0.1 / DEGREES
+    assert reference.psi_rate == pytest.approx(turn)
+    assert math.tan(reference.phi) == pytest.approx(1786.4 * turn / GRAVITY)
+    assert reference_at(50.0, guided(**ramp, bank_limit=5.0)).phi * DEGREES == pytest.approx(5.0)
+    assert reference_at(50.0, guided(**ramp, coordinated=False)).phi == 0.0
+
+
+@pytest.mark.unit
+def test_a_vehicle_is_led_to_its_waypoints_within_the_limits_of_its_rates():
+    made = guided(waypoints="x 100e3 y 20e3 h 25000 u 1800; x 200e3 y 20e3 h 24500 u 1800")
+    state = CRUISE
+    memory, reference = start_guidance(state, 0, made)
+    legs, headings, climbs = [], [], []
+    for number in range(1, 16000):  # a point that flies as it is told
+        x = state.x + 1786.4 * math.cos(reference.psi) * STEP
+        y = state.y + 1786.4 * math.sin(reference.psi) * STEP
+        state = state._replace(x=x, y=y, h=reference.altitude)
+        before = reference
+        memory, reference = guidance_step(memory, state, number, made)
+        headings.append((reference.psi - before.psi) * DEGREES / STEP)
+        climbs.append((reference.altitude - before.altitude) / STEP)
+        legs.append(memory.leg)
+    assert sorted(set(legs)) == [0.0, 1.0, 2.0], "both are reached, in their order"
+    assert max(map(abs, headings)) <= 0.15 + 1e-6 and max(map(abs, climbs)) <= 15.0 + 1e-4
+    assert max(climbs) == pytest.approx(15.0, abs=0.01)
+    assert reference.altitude == pytest.approx(24500.0, abs=1.0)
+
+
+@pytest.mark.unit
+def test_a_guidance_that_starts_again_in_flight_goes_on_to_the_first_waypoint_ahead():
+    made = guided(waypoints="x 100e3 y 0 h 25000 u 1800; x 200e3 y 0 h 24500 u 1800")
+    there = CRUISE._replace(x=150e3, h=24800.0)
+    memory, reference = start_guidance(there, 9000, made)
+    assert memory.leg == 1.0
+    assert (reference.altitude, reference.speed) == (24800.0, there.u)
+
+
+@pytest.mark.unit
+@pytest.mark.parametrize(
+    "values, words",
+    [
+        ({"altitude_changes": "up at 10"}, ("altitude_changes", "'up at 10'", "24500 at 10")),
+        ({"altitude_changes": "1 at 9; 2 at 3"}, ("change at 3 s", "until 9 s")),
+        ({"heading_changes": "1 at -5"}, ("heading_changes", "-5", "0 to 1e+06")),
+        ({"speed_changes": "1 at 1e999"}, ("speed_changes", "1 at 1e999")),
+        ({"waypoints": "x 1 y 2"}, ("waypoints", "x 1 y 2", "h 25000")),
+        ({"waypoints": "x 1e300 y 0 h 2 u 3"}, ("within", "1e+08")),
+        ({"shape": "soft"}, ("shape", "soft", "smooth or ramp")),
+        ({"keeps": "calm"}, ("keeps", "calm", "Mach number")),
+        ({"altitude_changes": "; ".join(["1 at 1"] * 99)}, ("99 entries", "50")),
+        (
+            {"waypoints": "x 1 y 2 h 3 u 4", "altitude_changes": "1 at 1"},
+            ("altitude_changes", "empty beside waypoints"),
+        ),
+    ],
+)
+def test_what_cannot_be_followed_is_refused_in_one_sentence(values, words):
+    with pytest.raises(ParameterError) as refused:
+        guided(**values)
+    assert all(word in str(refused.value) for word in words) and "\n" not in str(refused.value)
+
+
+@pytest.mark.unit
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ("altitude_changes: '60000 at 10'", ("at 10 s", "60000 m", "atmosphere")),
+        ("speed_changes: '900 at 10'", ("at 10 s", "900 m/s", "Mach 4")),
+        ("waypoints: 'x 1e5 y 0 h 24000 u 900'", ("waypoint 1", "900 m/s")),
+    ],
+)
+def test_where_the_model_does_not_hold_no_reference_leads(tmp_path, change, words):
+    profile = tmp_path / "profile.yaml"
+    profile.write_text(
+        "/**: {ros__parameters: {guided: true}}\n"
+        f"/**/guidance: {{ros__parameters: {{{change}}}}}\n"
+    )
+    with pytest.raises(ParameterError) as refused:
+        load_case("nominal_di", profile=str(profile))
+    assert all(word in str(refused.value) for word in words)
+
+
+@pytest.mark.unit
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("/**/guidance: {ros__parameters: {shape: ramp}}", ("guided: true",)),
+        (
+            "/**: {ros__parameters: {guided: true}}\n/**/plant: {ros__parameters: {seed: 1}}",
+            ("seed",),
+        ),
+        (
+            "/**: {ros__parameters: {guided: true}}\n/**/velocity: {ros__parameters: {k_u: 1.0}}",
+            ("velocity: k_u", "no place in a profile"),
+        ),
+    ],
+)
+def test_a_profile_says_what_is_flown_and_nothing_else(tmp_path, text, words):
+    profile = tmp_path / "profile.yaml"
+    profile.write_text(text)
+    with pytest.raises(ParameterError) as refused:
+        load_case("nominal_di", profile=str(profile))
+    assert all(word in str(refused.value) for word in words)
+
+
+def test_an_altitude_step_closes_as_the_loops_predict():
+    """The altitude error closes at k_h once theta follows: exp(-t/100 s), behind its own lag."""
+    case = load_case("nominal_di", {"duration": 660.0}, profile="altitude_step")
+    flight = record_of(fly(case), False)
+    altitude = flight.column("h")
+    settled = altitude[65900] - 24500.0  # 10 s before it goes down again
+    assert abs(settled) < 15.0, "what the loops leave, for fuel burns"
+    for time in (150, 250, 350):
+        left = (24500.0 - altitude[(60 + time) * 100]) / 500.0
+        assert left == pytest.approx(math.exp(-0.01 * time), abs=0.12)
+    assert flight.inlet_started
+
+
+@pytest.mark.parametrize("hardware", [None, "typical"])
+@pytest.mark.parametrize("profile", profile_names())
+def test_a_profile_flies_to_the_same_bits_as_nodes_in_lanes_and_again(
+    tmp_path, domain, profile, hardware
+):
+    case = load_case(
+        "neuro_adaptive_sc_gdi_protected", {"duration": 12.0}, hardware=hardware, profile=profile
+    )
+    flown = record_of(fly(case), False)
+    fly_graph(case, tmp_path / "bag", domain=domain)
+    graph = read_bag(tmp_path / "bag")
+    for name in ("states", "attitude_commands", "surfaces", "throttle", "references"):
+        assert np.array_equal(getattr(graph, name), getattr(flown, name)), name
+    again = replay(read_recording(tmp_path / "bag"), case, case.controllers)
+    assert "guidance" in {entry.node for entry in again.comparisons}
+    assert all(entry.compared == 1201 and not entry.differences for entry in again.comparisons)
+
+
+def test_a_lane_follows_its_own_waypoints_to_the_bits_of_the_run_alone():
+    case = load_case(
+        "neuro_adaptive_di", {"duration": 30.0}, hardware="typical", profile="waypoints"
+    )
+    campaign = Campaign(case, 0.2, 3, 5)
+    rows = fly_runs(campaign, 0, 3)
+    alone = fly_again(campaign, 2)
+    assert all(np.array_equal(alone[name][0], rows[name][2], equal_nan=True) for name in rows)
