@@ -45,7 +45,7 @@ class Led(NamedTuple):
 class RouteState(NamedTuple):
     """Where on its route a vehicle is."""
 
-    leg: float  # waypoints reached
+    leg: float  # [-] waypoints reached
     x: float  # [m] north, where the guidance started
     y: float  # [m] east
     altitude: Led  # [m]
@@ -112,7 +112,7 @@ def waypoint_ahead(leg: float, now: RouteState, state: State, route: Route) -> A
 
 @elementwise
 def first_ahead(state: State, route: Route) -> float:
-    """Count of the waypoints before the first that lies ahead, within 90 deg of the heading."""
+    """Count [-] of the waypoints before the first that is ahead, within 90 deg of the heading."""
     points = route.waypoints
     sine, cosine = sin_cos(state.psi)
     leg = widen(float(len(points)), state.u)
