@@ -21,6 +21,7 @@ from ahv_msgs_py.topics import (
     EARTH_FRAME,
     LEARNER,
     RATE_COMMAND,
+    REFERENCE,
     STATE,
     SURFACE_COMMAND,
     SURFACES,
@@ -110,6 +111,7 @@ class Quantity(NamedTuple):
 # The arrays of a record that hold a topic's fields, and the first field that they hold.
 ARRAYS: dict[LoopTopic, tuple[Callable[[FlightRecord], Rows | None], int]] = {
     STATE: (lambda record: record.states, 0),
+    REFERENCE: (lambda record: record.references, 0),
     ATTITUDE_COMMAND: (lambda record: record.attitude_commands, 0),
     RATE_COMMAND: (lambda record: record.rate_commands, 0),
     SURFACE_COMMAND: (lambda record: record.surfaces, 0),
@@ -144,13 +146,18 @@ def _derived(
     return Quantity(name, words, symbol, unit, frame, None, values)
 
 
-def _constant(
-    command: Callable[[FlightControl], float],
+def _wanted(
+    field: str, own: Callable[[FlightControl], float]
 ) -> Callable[[FlightRecord, Settings], Array | None]:
-    """A command among the settings."""
-    return lambda record, settings: (
-        None if settings is None else np.full(len(record.stamps), command(settings))
-    )
+    """A field of the reference of a guided flight; of any other the loops' own command."""
+    index = REFERENCE.layout.fields.index(field)
+
+    def values(record: FlightRecord, settings: Settings) -> Array | None:
+        if record.references is not None:
+            return record.references[:, index]
+        return None if settings is None else np.full(len(record.stamps), own(settings))
+
+    return values
 
 
 def _within(half: float) -> Callable[[Settings], Bounds]:
@@ -274,7 +281,9 @@ def _position(commanded: Quantity) -> Quantity:
 WEIGHT_UNITS = ("deg/s^2", *(f"deg/s^2/(deg/s)^{n}" for n in (1, 2, 1, 2, 4, 1, 2, 4, 4, 6)))
 QUANTITIES = (
     _velocity("u", "forward speed")._replace(
-        group="Path", reference=_constant(lambda settings: settings.velocity.speed), band=1.0
+        group="Path",
+        reference=_wanted("speed", lambda settings: settings.velocity.speed),
+        band=1.0,
     ),
     _velocity("v", "velocity right"),
     _velocity("w", "velocity down"),
@@ -289,7 +298,7 @@ QUANTITIES = (
     _recorded(STATE, "h", "h", "altitude", "h", "m", EARTH_FRAME)._replace(
         plate="path",
         group="Path",
-        reference=_constant(lambda settings: settings.outer.altitude),
+        reference=_wanted("altitude", lambda settings: settings.outer.altitude),
         band=25.0,
     ),
     _recorded(STATE, "mass", "mass", "mass", "M_v", "kg", "")._replace(
@@ -322,6 +331,15 @@ QUANTITIES = (
             BODY_FRAME,
         )._replace(shown="deg/s")
         for name, words in (("P", "roll rate"), ("Q", "pitch rate"), ("R", "yaw rate"))
+    ),
+    *(
+        _recorded(REFERENCE, name, f"{name}_reference", words, symbol, unit, EARTH_FRAME)
+        for name, words, symbol, unit in (
+            ("altitude", "altitude to follow", "h^*", "m"),
+            ("speed", "speed to follow", "u^*", "m/s"),
+            ("phi", "bank to follow", "φ^*", "rad"),
+            ("psi", "heading to follow", "ψ^*", "rad"),
+        )
     ),
     _surface("right_elevon", "right elevon", "down", "δ_e"),
     _surface("left_elevon", "left elevon", "down", "δ_a"),

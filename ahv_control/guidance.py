@@ -9,7 +9,10 @@ altitude and the speed among their own settings.
 """
 
 from collections.abc import Iterator
+from math import hypot
 from typing import NamedTuple
+
+import numpy as np
 
 from ahv_control.reference import Reference
 from ahv_control.route import Route, RouteState, route_step, start_route
@@ -118,17 +121,35 @@ start_guidance = optional(_start, otherwise=_unguided_start)
 guidance_step = optional(_step, otherwise=_unguided)
 
 
-def conditions(guidance: Guidance) -> Iterator[tuple[str, float, float]]:
-    """Where a guidance leads: a name, altitude [m] and speed [m/s] of every place it ends at."""
+def conditions(guidance: Guidance) -> Iterator[tuple[str, float, float, float]]:
+    """Where a guidance leads: name, altitude [m], speed [m/s] and time [s] of every place.
+
+    The time is the latest at which it can be reached flying straight at the least of the speeds.
+    """
     schedule, route = guidance.schedule, guidance.route
     if route is not None:
-        for count, (_, _, altitude, speed) in enumerate(route.waypoints.tolist(), 1):
-            yield f"waypoint {count}", altitude, speed
+        flown, x, y = 0.0, 0.0, 0.0
+        slowest = min(route.waypoints[:, 3].min(), schedule.speed[0, 1])
+        for count, (to_x, to_y, altitude, speed) in enumerate(route.waypoints.tolist(), 1):
+            flown, x, y = flown + hypot(to_x - x, to_y - y), to_x, to_y
+            yield f"waypoint {count}", altitude, speed, flown / max(slowest, 1.0)
     for rows in (schedule.altitude, schedule.speed):
         for at, _, _, over in rows.tolist():
             number = round((at + over) / STEP)
             reference = by_time(None, number, guidance)
-            yield f"at {number * STEP:g} s", reference.altitude, reference.speed
+            time = number * STEP
+            yield f"at {time:g} s", reference.altitude, reference.speed, time
+
+
+def fastest_turn(guidance: Guidance) -> float:
+    """Largest rate [rad/s] of the heading that a guidance asks for, steps aside."""
+    if guidance.route is not None:
+        return guidance.route.turn_rate
+    rows = guidance.schedule.heading
+    taking_time = rows[rows[:, 3] > 0.0]
+    steepest = 1.875 if guidance.schedule.smooth else 1.0  # of the quintic in its middle
+    rates = np.abs(taking_time[:, 2] - taking_time[:, 1]) / taking_time[:, 3]
+    return float(steepest * rates.max(initial=0.0))
 
 
 def warm_up_guidance(guidance: Guidance) -> None:

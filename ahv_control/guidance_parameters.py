@@ -21,12 +21,13 @@ from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_plant.model.constants import RADIANS, STEP
 from ahv_plant.start import GEOMETRIC_ALTITUDE
 
-NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+NUMBER = r"([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)"
 TRANSITION = re.compile(rf"{NUMBER} at {NUMBER}(?: over {NUMBER})?")
 WAYPOINT = re.compile(rf"x {NUMBER} y {NUMBER} h {NUMBER} u {NUMBER}")
 MOST = 50  # transitions or waypoints
 LATEST = 1e6  # [s]
 FARTHEST = 1e8  # [m]
+WIDEST = 3600.0  # [deg] ten turns
 SHAPES = ("smooth", "ramp")
 
 GUIDED = Parameter("guided", False, "follow /ahv/reference; if false, hold altitude and speed")
@@ -40,8 +41,8 @@ GUIDANCE_PARAMETERS = (
     Parameter("altitude_changes", "", f"altitudes [m] to change to: {_TRANSITIONS}"),
     Parameter("speed_changes", "", f"speeds [m/s] to change to: {_TRANSITIONS}"),
     Parameter("heading_changes", "", f"headings [deg] to change to: {_TRANSITIONS}"),
-    Parameter("shape", "smooth", f"of what takes time: {' or '.join(SHAPES)}"),
-    Parameter("keeps", "speed", f"what stays as it is in a climb: {', '.join(KEEPS)}"),
+    Parameter("shape", SHAPES[0], "of what takes time", choices=SHAPES),
+    Parameter("keeps", KEEPS[0], "what stays as it is in a climb", choices=KEEPS),
     Parameter(
         "waypoints",
         "",
@@ -67,8 +68,8 @@ def guidance(values: Mapping[str, Value]) -> Guidance:
         _transitions(values, "altitude", 1.0),
         _transitions(values, "speed", 1.0),
         _transitions(values, "heading", RADIANS),
-        _one_of(values, "shape", SHAPES) == 0,
-        _one_of(values, "keeps", KEEPS),
+        values["shape"] == SHAPES[0],
+        KEEPS.index(str(values["keeps"])),
         bool(values["geometric_altitude"]),
     )
     return Guidance(
@@ -78,14 +79,6 @@ def guidance(values: Mapping[str, Value]) -> Guidance:
         1.0 if values["feed_forward"] else 0.0,
         float(values["bank_limit"]) * RADIANS,
     )
-
-
-def _one_of(values: Mapping[str, Value], name: str, valid: tuple[str, ...]) -> int:
-    if values[name] not in valid:
-        raise ParameterError(
-            f"guidance: {name} is {excerpt(str(values[name]))}, but must be {' or '.join(valid)}"
-        )
-    return valid.index(str(values[name]))
 
 
 def _entries(
@@ -128,6 +121,8 @@ def _transitions(values: Mapping[str, Value], name: str, unit: float) -> Transit
                 f"{at + over:g} s"
             )
     table = np.array(rows)
+    if name == "heading" and np.abs(table[:, 2]).max() > WIDEST:
+        raise ParameterError(f"guidance: {field} must be within {WIDEST:g} deg of north")
     table[:, 0] = np.round(table[:, 0] / STEP) * STEP  # steps are whole
     table[:, 1:3] *= unit
     return table

@@ -87,8 +87,10 @@ def bearing_error(x: float, y: float, psi: float) -> float:
 
 
 @elementwise
-def waypoint_ahead(leg: float, now: RouteState, state: State, route: Route) -> Ahead:
-    """Waypoint of a `leg` as seen from the vehicle [m]; past the last one, the last.
+def waypoint_ahead(now: RouteState, state: State, route: Route) -> Ahead:
+    """Waypoint of the leg that is flown, as seen from the vehicle [m].
+
+    Past the last one there is none to turn to; its altitude and speed stay.
 
     A waypoint is reached within the radius, and when it is passed: when it lies behind the plane
     through the vehicle that is square to the leg.
@@ -98,7 +100,7 @@ def waypoint_ahead(leg: float, now: RouteState, state: State, route: Route) -> A
     altitude, speed = widen(points[-1, 2], one), widen(points[-1, 3], one)
     from_x, from_y = now.x, now.y
     for place in range(len(points)):
-        here = leg == float(place)
+        here = now.leg == float(place)
         to_x, to_y = points[place, 0] - state.x, points[place, 1] - state.y
         along = to_x * (points[place, 0] - from_x) + to_y * (points[place, 1] - from_y)
         near = to_x * to_x + to_y * to_y < route.radius * route.radius
@@ -148,11 +150,10 @@ def start_route(
 @elementwise
 def route_step(now: RouteState, state: State, route: Route) -> RouteState:
     """Route one step later, by the measured `state`; past the last waypoint, straight on."""
-    leg = now.leg + waypoint_ahead(now.leg, now, state, route).reached
-    ahead = waypoint_ahead(leg, now, state, route)
+    ahead = waypoint_ahead(now, state, route)
     turn = bearing_error(ahead.x, ahead.y, now.psi.value)
     return RouteState(
-        leg,
+        now.leg + ahead.reached,
         now.x,
         now.y,
         lead(now.altitude, ahead.altitude - now.altitude.value, route.climb_rate, route.build_up),

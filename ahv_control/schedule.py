@@ -3,8 +3,8 @@
 
 A transition is a row (at [s], from, to, over [s]): a step if it takes no time, else a ramp, or a
 smooth one whose rate and acceleration begin and end at zero, 10 s^3 - 15 s^4 + 6 s^5: of all such
-the one of least jerk (Flash and Hogan, 1985). Its largest
-rate is 15/8 of a ramp's, its largest jerk 60 times the change over the time to the third power.
+the one of least jerk (Flash and Hogan, 1985). Its largest rate is 15/8 of a ramp's, its largest
+jerk 60 times the change over the time to the third power.
 """
 
 from math import sqrt
@@ -18,7 +18,6 @@ from ahv_plant.model.constants import STEP
 from ahv_plant.numerics.elementwise import elementwise, select
 
 Transitions = NDArray[np.float64]  # (n, 4), n >= 1, in the order of their times
-STEEPEST = 1.875  # [-] largest rate of a smooth transition, as a multiple of its mean
 KEEPS = ("speed", "Mach number", "dynamic pressure")  # what stays as it is when altitude changes
 
 

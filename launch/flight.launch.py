@@ -86,7 +86,12 @@ def _nodes(context: LaunchContext) -> list[Node]:
         )
 
     nodes = [node("recorder", [shell | {"bag": str(bag), "notes": notes}])] if record else []
-    nodes += [node(name, [shell], respawn=realtime) for name in case.controllers]
+    # guidance starts at the altitude and speed that the loops of the case would hold
+    start = {name: case.parameters["guidance"][name] for name in ("altitude", "speed")}
+    nodes += [
+        node(name, [shell | start if name == "guidance" else shell], respawn=realtime)
+        for name in case.controllers
+    ]
     return [*nodes, node("plant", plant)]
 
 

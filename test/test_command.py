@@ -40,6 +40,15 @@ def told(*arguments, cwd="."):
     return subprocess.CompletedProcess(arguments, end.exit_code, end.stdout, end.stderr)
 
 
+def assert_refused(result, words, folder):
+    """One sentence with these words, exit code 2, and nothing left behind."""
+    assert result.returncode == 2, result.stderr
+    assert result.stdout == "" and "Traceback" not in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert all(word in result.stderr for word in words), result.stderr
+    assert not list(folder.iterdir())
+
+
 def test_trim_as_json():
     result = told("trim", "--json")
     found = json.loads(result.stdout)

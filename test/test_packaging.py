@@ -215,6 +215,18 @@ def test_launch_starts_a_process_per_node_from_one_case(launch, setup):
     assert all(hasattr(node, "on_exit") for node in nodes.values())
 
 
+def test_launched_guidance_starts_where_the_loops_of_the_case_would_stay(launch, tmp_path):
+    case = tmp_path / "case.yaml"
+    case.write_text(
+        "/**: {ros__parameters: {base: nominal_di, guided: true}}\n"
+        "/**/outer_intermediate: {ros__parameters: {altitude: 24300.0}}\n"
+    )
+    nodes = launch(case=str(case))
+    start = {"altitude": 24300.0, "speed": 1786.4}
+    assert nodes["guidance"].parameters[1:] == [LOCKSTEP | start]
+    assert nodes["velocity"].parameters[1:] == [LOCKSTEP]
+
+
 def test_launch_adds_the_learner_to_adaptive_cases(launch):
     nodes = launch(case="neuro_adaptive_di")
     assert set(nodes) == set(NODES) - {"guidance"}

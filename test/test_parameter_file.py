@@ -185,3 +185,16 @@ def test_a_node_ignores_what_is_for_all_and_refuses_what_is_misspelt_for_it(tmp_
     assert "no parameter 'k_x'; did you mean 'k_u'? ignored, as it is for all nodes" in ignored
     assert refused.startswith("velocity: there is no parameter 'k_uu'; did you mean 'k_u'? valid")
     assert node.returncode == 2
+
+
+@pytest.mark.unit
+def test_a_number_that_never_ends_is_read_at_once(tmp_path):
+    """Its digits are looked at once: twice as many do not take four times as long."""
+    path = tmp_path / "long.yaml"
+    path.write_text(f"/**: {{ros__parameters: {{a: {'9' * 200_000}x}}}}")
+    code = "import sys; from pathlib import Path; from ahv_msgs_py.parameter_file import *; "
+    code += "print(len(read_parameter_file(Path(sys.argv[1]))['/**']['a']))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, path], capture_output=True, text=True, timeout=PATIENCE
+    )
+    assert done.stdout == "200001\n", done.stderr

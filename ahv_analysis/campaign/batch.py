@@ -31,12 +31,12 @@ LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 @kernel
 def run_outcome(state, truth, control, steps):
     """Outcome of a flight; the numbers may be lanes."""
-    one, altitude = state.u, control.outer.altitude
+    one = state.u
     loop, outcome = widen(start_loop(state, truth, control, None, None), one), widen(START, one)
     for number in range(steps):
-        outcome = next_outcome(outcome, loop, number, altitude, truth)
+        outcome = next_outcome(outcome, loop, number, control, truth)
         loop = widen(loop_step(loop, number, truth, control, None, None), one)
-    return next_outcome(outcome, loop, steps, altitude, truth)
+    return next_outcome(outcome, loop, steps, control, truth)
 
 
 @kernel
@@ -57,9 +57,9 @@ def begin(state, truth, control, draws, rig):
 @kernel
 def go_on(loop, outcome, first, block, like, truth, control, rig):
     """Loop and outcome after as many steps as there are rows of draws in a block."""
-    one, altitude = loop.plant.state.u, control.outer.altitude
+    one = loop.plant.state.u
     for row in range(len(block)):
-        outcome = next_outcome(outcome, loop, first + row, altitude, truth)
+        outcome = next_outcome(outcome, loop, first + row, control, truth)
         draws = load(like, block[row])
         loop = widen(loop_step(loop, first + row, truth, control, draws, rig), one)
     return loop, outcome
@@ -93,10 +93,10 @@ def go_on_batch(kept, like, dispersions, first, block, truth, control, rig):
 
 
 @kernel
-def end_batch(kept, like, steps, altitude, truth, result):
+def end_batch(kept, like, steps, control, truth, result):
     """Outcomes of a batch at the end of its flight."""
     loop, outcome = load(like, kept)
-    store(result, next_outcome(outcome, loop, steps, altitude, truth))
+    store(result, next_outcome(outcome, loop, steps, control, truth))
 
 
 @kernel
@@ -212,7 +212,7 @@ def fly_batch_on_hardware(
         for flown in range(0, steps, DRAWN):
             draws = drawn(min(DRAWN, steps - flown))
             go_on_batch(kept, like, vehicles, flown, draws, truth, control, equipped)
-        end_batch(kept, sample, steps, control.outer.altitude, truth, outcomes)
+        end_batch(kept, sample, steps, control, truth, outcomes)
         rows.append(outcomes.T.copy())
     return np.concatenate(rows)[: len(states)]
 
@@ -248,8 +248,7 @@ def fly_alone(case: Case) -> Outcome:
     for flown in range(0, steps, DRAWN):
         block = stream.block(min(DRAWN, steps - flown))
         loop, outcome = go_on(loop, outcome, flown, block, NO_DRAWS, truth, case.control, equipped)
-    altitude = case.control.outer.altitude
-    return Outcome(*next_outcome(outcome, loop, steps, altitude, truth))
+    return Outcome(*next_outcome(outcome, loop, steps, case.control, truth))
 
 
 def lanes_of(rows: Array, first: int) -> Array:

@@ -4,7 +4,7 @@
 import sys
 from math import nan
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -31,32 +31,25 @@ from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED, Trim
 DECIMALS = 9  # of what is printed
 
 
+def _number(help_text: str) -> Any:
+    """Return an option that is a number, or with --map several."""
+    return typer.Option(metavar="NUMBER", help=help_text)
+
+
 def trim(
     altitude: Annotated[
         str | None,
-        typer.Option(
-            metavar="NUMBER",
-            help=f"Altitude [m], or in km; by default {CRUISE_ALTITUDE:g}, of a map {ALTITUDES}.",
-        ),
+        _number(f"Altitude [m], or in km; by default {CRUISE_ALTITUDE:g}, of a map {ALTITUDES}."),
     ] = None,
     speed: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NUMBER", help=f"Forward speed u [m/s], by default {CRUISE_SPEED:g}."
-        ),
+        str | None, _number(f"Forward speed u [m/s], by default {CRUISE_SPEED:g}.")
     ] = None,
     mach: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NUMBER", help=f"Instead: Mach number of u; of a map by default {MACHS}."
-        ),
+        str | None, _number(f"Instead: Mach number of u; of a map by default {MACHS}.")
     ] = None,
     mass: Annotated[
         str | None,
-        typer.Option(
-            metavar="NUMBER",
-            help=f"Mass [kg], or in t; by default {INITIAL_MASS:g}, of a map {MASSES}.",
-        ),
+        _number(f"Mass [kg], or in t; by default {INITIAL_MASS:g}, of a map {MASSES}."),
     ] = None,
     geometric: Annotated[
         bool, typer.Option("--geometric", help="The altitude is geometric, not geopotential.")

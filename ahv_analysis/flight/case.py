@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from ahv_analysis.flight.reach import check_reach
 from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
-from ahv_control.guidance import Guidance, conditions
+from ahv_control.guidance import Guidance
 from ahv_control.guidance_parameters import GUIDED, guidance
 from ahv_control.parameters import (
     COMMANDED,
@@ -247,11 +248,7 @@ def _guidance(
     made = guidance(parameters["guidance"])
     if not guided["guidance"]:
         return None
-    for place, altitude, speed in conditions(made):
-        try:
-            check_flight_condition(altitude, speed, plant.initial.mass, plant.truth.geometric)
-        except ValueError as error:
-            raise ParameterError(f"guidance: {place}: {error}") from error
+    check_reach(made, plant)
     return made
 
 

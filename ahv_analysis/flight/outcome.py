@@ -9,14 +9,13 @@ from typing import NamedTuple
 
 from ahv_analysis.flight.closed_loop import Loop
 from ahv_control.disturbance_learner import LearnerState
-from ahv_control.reference import Reference
+from ahv_control.flight_control import FlightControl, followed
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.wind import through_air
 from ahv_plant.model.constants import STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementary import atan2, atan_ratio
 from ahv_plant.numerics.elementwise import elementwise, kernel, select
-from ahv_plant.numerics.optional import optional
 from ahv_plant.termination import termination
 
 
@@ -96,29 +95,17 @@ def first_cause(states, lost, geometric):
     return 0.0
 
 
-def _led(held: float, reference: Reference) -> float:
-    return reference.altitude
-
-
-def _held(held: float) -> float:
-    return held
-
-
-# altitude_wanted(held, reference): h* [m] of the reference, or where that is None the one held
-altitude_wanted = optional(_led, otherwise=_held)
-
-
 @elementwise
 def next_outcome(
-    outcome: Outcome, loop: Loop, number: int, altitude: float, truth: Truth
+    outcome: Outcome, loop: Loop, number: int, control: FlightControl, truth: Truth
 ) -> Outcome:
     """Outcome after one more state and its answer; once a run has failed nothing changes.
 
-    `number` counts the steps flown before, `altitude` [m] is h* without guidance. Angles are those
-    against the air.
+    `number` counts the steps flown before. Angles are those against the air; the altitude error
+    [m] is that to the reference of `control`.
     """
     state, answer = loop.plant.state, loop.commands
-    wanted = altitude_wanted(altitude, loop.reference)
+    wanted = followed(control, loop.reference).altitude
     observed = observer_error(loop.plant.measured.state, loop.memory)
     moving = through_air(state, number * STEP, loop.plant.turbulence, truth.wind)
     alpha = abs(atan2(moving.w, moving.u))
