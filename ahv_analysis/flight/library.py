@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from ahv_analysis.bag.record import Step
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.bag.solver_status import lost_status
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
@@ -29,26 +30,58 @@ from ahv_msgs_py.topics import (
     TRUTH,
     LoopTopic,
 )
+from ahv_plant.hardware.noise import Draws, draws_of
 from ahv_plant.model.constants import STEP, STEP_NS
-from ahv_plant.plant import Rig, all_draws, rig
-from ahv_plant.termination import termination_reason
+from ahv_plant.numerics.elementwise import kernel
+from ahv_plant.numerics.optional import optional
+from ahv_plant.plant import Rig, noise_stream, rig
+from ahv_plant.termination import termination, termination_reason
 
+BLOCK = 100  # steps that are flown at a time
 CHUNK = 1000 * STEP_NS  # [ns] of flight that a bag keeps together
 INTERRUPTED = "interrupted"  # why a flight ended early, where a signal does not end the program
+
+
+@optional
+def _drawn(row: int, block: Array) -> Draws:
+    """Draws in a row of a block; None where nothing is drawn."""
+    return draws_of(block[row])
+
+
+@kernel
+def fly_on(loop, first, steps, truth, control, block, rig):
+    """Loop after `first` steps, and after each of so many more, up to where the flight ends.
+
+    Settings are handed over once for all of them: that takes longer than a step.
+    """
+    flown = [loop]
+    for row in range(steps):
+        loop = loop_step(loop, first + row, truth, control, _drawn(row, block), rig)
+        flown.append(loop)
+        if termination(loop.plant.state, truth.geometric) != 0:
+            break
+    return flown
 
 
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the model no longer describes the vehicle."""
     truth, control, equipped = case.plant.truth, case.control, rig(case.plant.hardware)
-    draws = all_draws(case.plant.hardware, truth.wind, *case.plant.noise)
-    loop = start_loop(case.plant.initial, truth, control, next(draws), equipped)
-    for number in range(case.plant.steps):
-        later = loop_step(loop, number, truth, control, next(draws), equipped)
-        reason = termination_reason(later.plant.state, truth.geometric, (number + 1) * STEP)
-        yield _step(number, loop, reason, equipped)
+    noise = None
+    if case.plant.hardware is not None:
+        noise = noise_stream(case.plant.hardware, truth.wind, *case.plant.noise)
+    block = noise and noise.block(1)
+    loop = start_loop(case.plant.initial, truth, control, _drawn(0, block), equipped)
+    for first in range(0, case.plant.steps, BLOCK):
+        steps = min(BLOCK, case.plant.steps - first)
+        block = noise and noise.block(steps)
+        flown = fly_on(loop, first, steps, truth, control, block, equipped)
+        loop = flown.pop()
+        reason = termination_reason(loop.plant.state, truth.geometric, (first + len(flown)) * STEP)
+        for number, before in enumerate(flown[:-1], first):
+            yield _step(number, before, "", equipped)
+        yield _step(first + len(flown) - 1, flown[-1], reason, equipped)
         if reason:
             return
-        loop = later
     yield _step(case.plant.steps, loop, "", equipped)
 
 
