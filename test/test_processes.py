@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
+from socket import SO_RCVBUF, SOCK_DGRAM, SOL_SOCKET, socket
 from textwrap import wrap
 from xml.etree import ElementTree
 
@@ -186,6 +187,22 @@ def test_nobody_on_another_machine_is_heard(realtime):
             addresses = set(listening(process.pid))
             assert addresses, name
             assert all(one.is_loopback or one.is_multicast for one in addresses), name
+
+
+def test_a_node_that_joins_has_room_for_all_that_it_is_told_at_once():
+    """Linux by itself has room for half: the rest came a second later, on a busy machine."""
+    permitted = int(Path("/proc/sys/net/core/rmem_max").read_text())
+    wanted = 2 * min(permitted, 4 << 20)  # the kernel doubles it, for what it keeps beside the data
+    keep_to_this_machine()
+    spectator, rooms = Spectator(), []
+    try:
+        for descriptor in Path("/proc/self/fd").iterdir():
+            with suppress(OSError), socket(fileno=os.dup(int(descriptor.name))) as one:
+                if one.type == SOCK_DGRAM:
+                    rooms.append(one.getsockopt(SOL_SOCKET, SO_RCVBUF))
+    finally:
+        spectator.close()
+    assert sum(room >= wanted for room in rooms) >= 3, rooms  # multicast, discovery, messages
 
 
 def may_take_precedence():
