@@ -192,7 +192,7 @@ def test_nobody_on_another_machine_is_heard(realtime):
 def test_a_node_that_joins_has_room_for_all_that_it_is_told_at_once():
     """Linux by itself has room for half: the rest came a second later, on a busy machine."""
     permitted = int(Path("/proc/sys/net/core/rmem_max").read_text())
-    wanted = 2 * min(permitted, 4 << 20)  # the kernel doubles it, for what it keeps beside the data
+    wanted = 2 * min(permitted, 4 << 20)  # the kernel doubles it for its own needs
     keep_to_this_machine()
     spectator, rooms = Spectator(), []
     try:
