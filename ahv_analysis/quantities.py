@@ -12,7 +12,7 @@ import numpy as np
 
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.bag.rows import Array, Rows
-from ahv_control.flight_control import FlightControl
+from ahv_control.own_law import Control
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
     BASIS_NAMES,
@@ -38,7 +38,7 @@ from ahv_plant.model.constants import (
     UNSTART_ALPHA,
 )
 
-Settings = FlightControl | None  # None where a bag does not tell them
+Settings = Control | None  # None where a bag does not tell them
 Bounds = tuple[float, float] | None
 
 # Units for people, and what a number in SI units is multiplied by.
@@ -147,7 +147,7 @@ def _derived(
 
 
 def _wanted(
-    field: str, own: Callable[[FlightControl], float]
+    field: str, own: Callable[[Control], float]
 ) -> Callable[[FlightRecord, Settings], Array | None]:
     """A field of the reference of a guided flight; of any other the loops' own command."""
     index = REFERENCE.layout.fields.index(field)
@@ -282,7 +282,7 @@ WEIGHT_UNITS = ("deg/s^2", *(f"deg/s^2/(deg/s)^{n}" for n in (1, 2, 1, 2, 4, 1, 
 QUANTITIES = (
     _velocity("u", "forward speed")._replace(
         group="Path",
-        reference=_wanted("speed", lambda settings: settings.velocity.speed),
+        reference=_wanted("speed", lambda settings: settings.speed),
         band=1.0,
     ),
     _velocity("v", "velocity right"),
@@ -298,7 +298,7 @@ QUANTITIES = (
     _recorded(STATE, "h", "h", "altitude", "h", "m", EARTH_FRAME)._replace(
         plate="path",
         group="Path",
-        reference=_wanted("altitude", lambda settings: settings.outer.altitude),
+        reference=_wanted("altitude", lambda settings: settings.altitude),
         band=25.0,
     ),
     _recorded(STATE, "mass", "mass", "mass", "M_v", "kg", "")._replace(

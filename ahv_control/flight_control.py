@@ -47,6 +47,16 @@ class FlightControl(NamedTuple):
     learner: LearnerSettings | None
     guidance: Guidance | None = None
 
+    @property
+    def altitude(self) -> float:
+        """Altitude [m] that is held without guidance."""
+        return self.outer.altitude
+
+    @property
+    def speed(self) -> float:
+        """Speed u [m/s] that is held without guidance, eq 3.2."""
+        return self.velocity.speed
+
 
 def _told(settings: FlightControl, reference: Reference) -> Reference:
     return reference

@@ -35,6 +35,7 @@ class SolverStatus(IntEnum):
     SATURATED = 1  # solved, but the solution lies beyond a stop and is held there
     ITERATION_LIMIT = 2  # the last correction was not small: the surfaces are the last iterate
     SINGULAR = 3  # the surfaces cannot turn the vehicle: they stay as they were
+    NO_ANSWER = 4  # a law raised, or answered what is no number: all stays as it was
 
 
 class Solution(NamedTuple):

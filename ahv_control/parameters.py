@@ -140,6 +140,19 @@ VELOCITY_PARAMETERS = (
     GEOMETRIC_ALTITUDE,
 )
 
+FLIGHT_CONTROL_PARAMETERS = (
+    Parameter("law", "", "law of your own: its name, or its file; empty: the loops fly"),
+    Parameter("altitude", 24000.0, "altitude to hold without guidance", "m", 0.0, 48000.0),
+    Parameter("speed", 1786.4, "forward speed to hold without guidance", "m/s", 0.0, 8000.0),
+    Parameter(
+        "surfaces_measured",
+        False,
+        "the plant measures its surfaces, as it does if its hardware is not ideal; if false, they "
+        "are taken to be where they were commanded to be",
+    ),
+    GUIDED,
+)
+
 ParameterValues = Mapping[str, Value]
 
 

@@ -22,6 +22,7 @@ class GraphNode(NamedTuple):
     controller: bool = False
     adaptive: bool = False  # flies with adaptive cases only
     guided: bool = False  # flies with cases that have guidance only
+    own_law: bool = False  # flies in the place of the loops, with a law of one's own
 
     @property
     def node_class(self) -> type[Any]:
@@ -94,6 +95,16 @@ _NODES = (
         sends=("throttle_command",),
         controller=True,
     ),
+    GraphNode(
+        "flight_control",
+        "ahv_control.flight_control_node",
+        "FlightControlNode",
+        "ahv_control.parameters.FLIGHT_CONTROL_PARAMETERS",
+        hears=("state", "surfaces", "reference"),
+        sends=("attitude_command", "rate_command", "surface_command", "throttle_command"),
+        controller=True,
+        own_law=True,
+    ),
     GraphNode(  # hears every topic there is, those of the loop among them
         "recorder",
         "ahv_analysis.bag.recorder_node",
@@ -111,17 +122,20 @@ def case_nodes() -> list[str]:
     return [name for name, node in NODES.items() if node.sends]
 
 
-def controllers(adaptive: bool, guided: bool = False) -> list[str]:
+def controllers(adaptive: bool, guided: bool = False, own_law: bool = False) -> list[str]:
     """Names of the controllers of a case, in the order in which they answer a state."""
     return [
         name
         for name, node in NODES.items()
-        if node.controller and adaptive >= node.adaptive and guided >= node.guided
+        if node.controller
+        and adaptive >= node.adaptive
+        and guided >= node.guided
+        and (own_law == node.own_law or node.guided)
     ]
 
 
 def sender(topic: str) -> str:
-    """Name of the node that sends a topic of the loop."""
+    """Name of the node that sends a topic of the loop, where no law of one's own flies."""
     return next(name for name, node in NODES.items() if topic in node.sends)
 
 

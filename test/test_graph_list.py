@@ -51,21 +51,27 @@ def test_the_list_is_read_before_anything_is_installed():
 
 
 def test_every_topic_of_the_loop_has_one_sender():
-    sent = [topic for node in NODES.values() for topic in node.sends]
-    assert sorted(sent) == sorted(BY_NAME)
+    for own_law in (False, True):
+        names = ["plant", *controllers(adaptive=not own_law, guided=True, own_law=own_law)]
+        sent = [topic for name in names for topic in NODES[name].sends]
+        learned = {"disturbance_estimate", "learner"} if own_law else set()
+        assert sorted(sent) == sorted({*BY_NAME} - learned)
     assert {topic for node in NODES.values() for topic in node.hears} <= set(BY_NAME)
     assert not listeners("attitude_command"), "it is for those who look on"
 
 
 def test_controllers_answer_in_the_order_of_the_loop():
     """None of them waits in a step for one that comes after it, but the learner for all."""
-    for adaptive, guided in product((False, True), repeat=2):
-        heard = ["state"]
-        names = controllers(adaptive, guided)
+    for adaptive, guided, own_law in product((False, True), repeat=3):
+        heard = ["state", "surfaces"] if own_law else ["state"]
+        names = controllers(adaptive and not own_law, guided, own_law)
         for name in names:
             if name != "disturbance_learner":
                 flown = [node.sends for node in map(NODES.get, names)]
                 missing = {*NODES[name].hears} & {topic for sent in flown for topic in sent}
                 assert missing <= {*heard}
             heard += NODES[name].sends
-    assert set(case_nodes()) == {"plant", *controllers(adaptive=True, guided=True)}
+    loops = controllers(adaptive=True, guided=True)
+    own = controllers(adaptive=False, guided=True, own_law=True)
+    assert own == ["guidance", "flight_control"], "it takes the place of every loop"
+    assert set(case_nodes()) == {"plant", *loops, *own}

@@ -8,10 +8,10 @@ import numpy as np
 from ahv_analysis.bag.record import FlightRecord, record_of
 from ahv_analysis.bag.rows import Array
 from ahv_analysis.flight.case import Case
-from ahv_analysis.flight.closed_loop import loop_step, start_loop
+from ahv_analysis.flight.closed_loop import loop_of, loop_step, start_loop
 from ahv_analysis.flight.library import fly
-from ahv_analysis.flight.outcome import START, Outcome, next_outcome
-from ahv_control.flight_control import FlightControl
+from ahv_analysis.flight.outcome import START, Outcome, next_outcome, outcome_after
+from ahv_control.own_law import Control, is_compiled
 from ahv_plant.dispersion import Dispersion, Truth
 from ahv_plant.hardware.delay import ROWS
 from ahv_plant.hardware.noise import NO_DRAWS, Channel, NoiseStream, draws_of
@@ -21,7 +21,7 @@ from ahv_plant.model.vectors import State
 from ahv_plant.numerics.elementwise import kernel
 from ahv_plant.numerics.optional import optional
 from ahv_plant.numerics.simd import LANES, load, store, widen
-from ahv_plant.plant import DRAWN, Hardware, Rig, noise_stream, rig
+from ahv_plant.plant import DRAWN, Hardware, Rig, all_draws, noise_stream, rig
 from ahv_plant.termination import termination
 
 # What the rows of the arrays are: load() reads the shape of its result from these.
@@ -132,7 +132,7 @@ def _keep(row, state, answer, states, commands):
 
 def fly_trajectory(case: Case, every: int) -> FlightRecord:
     """Fly a case alone and keep every so many of its steps, to be drawn."""
-    if case.plant.hardware is not None:
+    if case.plant.hardware is not None or not is_compiled(case.control):
         kept = (step for step in fly(case) if step.stamp % (every * STEP_NS) == 0)
         return record_of(kept, case.plant.truth.geometric)
     steps, truth = case.plant.steps, case.plant.truth
@@ -153,7 +153,7 @@ def fly_trajectory(case: Case, every: int) -> FlightRecord:
 
 
 def fly_batch(
-    states: Array, dispersions: Array, truth: Truth, control: FlightControl, steps: int
+    states: Array, dispersions: Array, truth: Truth, control: Control, steps: int
 ) -> Array:
     """Outcomes (N, 14) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9).
 
@@ -181,7 +181,7 @@ def fly_batch_on_hardware(
     starts: Array,
     noise: Sequence[NoiseStream],
     truth: Truth,
-    control: FlightControl,
+    control: Control,
     hardware: Hardware,
     steps: int,
 ) -> Array:
@@ -241,6 +241,8 @@ def find_trims(
 def fly_alone(case: Case) -> Outcome:
     """Outcome of one run by scalar code: the same bits as in a lane."""
     state, steps, truth, hardware, noise = case.plant
+    if not is_compiled(case.control):
+        return _fly_plain(case)
     if hardware is None:
         return Outcome(*run_outcome(state, truth, case.control, steps))
     equipped, stream = rig(hardware), noise_stream(hardware, truth.wind, *noise)
@@ -249,6 +251,21 @@ def fly_alone(case: Case) -> Outcome:
         block = stream.block(min(DRAWN, steps - flown))
         loop, outcome = go_on(loop, outcome, flown, block, NO_DRAWS, truth, case.control, equipped)
     return Outcome(*next_outcome(outcome, loop, steps, case.control, truth))
+
+
+def _fly_plain(case: Case) -> Outcome:
+    """Outcome of one run of a law in plain Python; nothing changes once it has failed."""
+    state, steps, truth, hardware, noise = case.plant
+    control, equipped = case.control, rig(hardware)
+    draws = all_draws(hardware, truth.wind, *noise)
+    first, later = loop_of(control)
+    loop, outcome = first(state, truth, control, next(draws), equipped), START
+    for number in range(steps):
+        outcome = outcome_after(outcome, loop, number, control, truth)
+        if outcome.cause != 0.0:
+            return outcome
+        loop = later(loop, number, truth, control, next(draws), equipped)
+    return outcome_after(outcome, loop, steps, control, truth)
 
 
 def lanes_of(rows: Array, first: int) -> Array:

@@ -4,8 +4,9 @@
 import os
 import platform
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,9 +38,17 @@ from ahv_analysis.campaign.store import (
     write_part,
 )
 from ahv_analysis.errors import CampaignError, CampaignStopped
-from ahv_analysis.flight.case import Case, Draw, dispersion_parameters, make_case
+from ahv_analysis.flight.case import (
+    OWN_LAW,
+    Case,
+    Draw,
+    dispersion_parameters,
+    make_case,
+)
 from ahv_analysis.flight.outcome import Outcome
 from ahv_analysis.versions import what_computes
+from ahv_control.law_file import compiling, law_identity
+from ahv_control.own_law import is_compiled
 from ahv_plant.dispersion import Dispersion, draw_dispersion, in_calm
 from ahv_plant.draws import Distributions, draw_values
 from ahv_plant.hardware.noise import NO_DRAWS
@@ -51,6 +60,7 @@ from ahv_plant.numerics.identity import Definition
 from ahv_plant.plant import noise_stream, rig
 
 RUNS_PER_JOB = 64  # four batches: half a second of work, so that little is lost and little waits
+RUNS_IN_PLAIN_PYTHON = 4  # the same for laws that are not compiled: some seconds of work
 LOOK = 0.2  # [s] between looks for an interruption
 JOBS_UNDER_WAY = 64  # handed to the executor at a time, so that a campaign of any size can wait
 # Random starts of section 3.5.2, around the case's own: plus and minus, in the plant's parameters.
@@ -77,8 +87,10 @@ class Campaign:
 
     def describe(self) -> dict[str, Any]:
         """All that decides a run: what computes it too, but not the number of runs."""
+        law = self.case.law
         return {
             **COMPUTED_BY,
+            **({} if law is None else {"law": law.identity}),
             "case": self.case.name,
             "level": self.level,
             "seed": self.seed,
@@ -129,7 +141,8 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     """
     runs = range(first, first + count)
     drawn_filters = campaign.random_starts and is_turbulent(campaign.case.plant.truth.wind)
-    if campaign.draws is not None or drawn_filters:  # those of turbulence go by the first speed
+    alone = drawn_filters or not is_compiled(campaign.case.control)
+    if campaign.draws is not None or alone:  # filters of turbulence go by the first speed
         rows = [fly_again(campaign, run) for run in runs]
         return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
     dispersions = np.array([campaign.dispersion(run) for run in runs])
@@ -147,8 +160,8 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
         )
     trims = find_trims(
         dispersions,
-        control.outer.altitude,
-        control.velocity.speed,
+        control.altitude,
+        control.speed,
         initial.mass,
         in_calm(truth),
     )
@@ -161,7 +174,7 @@ def fly_again(campaign: Campaign, run: int) -> Columns:
     case = campaign.case_of(run)
     control, initial, truth = case.control, case.plant.initial, case.plant.truth
     outcome = fly_alone(case)
-    altitude, speed = control.outer.altitude, control.velocity.speed
+    altitude, speed = control.altitude, control.speed
     trim = level_trim(altitude, speed, initial.mass, in_calm(truth))
     draws = None if case.plant.hardware is None else NO_DRAWS
     bound = nose_down(initial, truth, draws, rig(case.plant.hardware))
@@ -174,13 +187,22 @@ def fly_job(described: dict[str, Any], first: int, count: int) -> Columns | str:
 
     A refusal is a result and no error, for executors try again elsewhere what is one.
     """
-    differing = differences(described | COMPUTED_BY, described)
+    differing = differences(described | COMPUTED_BY | _law_here(described), described)
     if differing:
         return (
             f"{_this_worker()} would compute other numbers ({differing}): "
             "give it the code and the packages of this machine, and start it anew"
         )
-    return fly_runs(_campaign_of(described, first + count), first, count)
+    campaign = _campaign_of(described, first + count)
+    with compiling(campaign.case.law):
+        return fly_runs(campaign, first, count)
+
+
+def _law_here(described: Mapping[str, Any]) -> dict[str, str]:
+    """Identity of the law of a campaign in this process, as `describe` has it; read, not run."""
+    if "law" not in described:
+        return {}
+    return {"law": law_identity(str(described["parameters"][OWN_LAW]["law"]))}
 
 
 def _this_worker() -> str:
@@ -289,6 +311,11 @@ def _flown(job: Future[Columns | str]) -> Columns:
     """Result of a job; CampaignError if it was refused, CampaignStopped if it was given up."""
     try:
         result = job.result()
+    except BrokenProcessPool as error:
+        raise CampaignStopped(
+            "a process that flew ended without a word, as one does whose law crashes or takes all "
+            "memory: what was flown is kept"
+        ) from error
     except CancelledError as error:
         raise CampaignStopped(
             "the jobs were given up, as when a scheduler dies: "
@@ -315,15 +342,17 @@ def _jobs(
 
     A part enters `parts` with its first job, so that only those under way are in memory.
     """
+    compiled = is_compiled(campaign.case.control)
+    at_once = RUNS_PER_JOB if compiled else RUNS_IN_PLAIN_PYTHON
     for start in range(0, campaign.runs, PART_RUNS):
         end = min(start + PART_RUNS, campaign.runs)
         path = part_file(kept, start)
         filed = [read_part(path)[0]] if path.exists() else []
         done = set(filed[0]["run"].tolist()) if filed else set()
         jobs = [
-            (start, first, min(RUNS_PER_JOB, end - first))
-            for first in range(start, end, RUNS_PER_JOB)
-            if not done.issuperset(range(first, min(first + RUNS_PER_JOB, end)))
+            (start, first, min(at_once, end - first))
+            for first in range(start, end, at_once)
+            if not done.issuperset(range(first, min(first + at_once, end)))
         ]
         if jobs:
             parts[start] = _Part(filed, [], len(jobs))
@@ -347,6 +376,12 @@ def open_campaign(folder: Path, level: float | None = None) -> Campaign:
         raise CampaignError(
             f"{found[chosen[0]]} holds runs of level {described['level']}: "
             f"its name was runs-{level_name(described['level'])}"
+        )
+    differing = differences(described | _law_here(described), described)
+    if differing:
+        raise CampaignError(
+            f"{found[chosen[0]]} was flown by another source of its law ({differing}): "
+            "its runs cannot be flown again"
         )
     return _campaign_of(described, int(last["run"][-1]) + 1)
 

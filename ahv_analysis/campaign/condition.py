@@ -47,13 +47,13 @@ def at_condition(name: str, given: Given, conditions: Mapping[str, float]) -> tu
     """
     case = make_case(name, given)
     geometric = case.plant.truth.geometric
-    altitude = conditions.get("altitude", case.control.outer.altitude)
-    speed = case.control.velocity.speed
+    altitude = conditions.get("altitude", case.control.altitude)
+    speed = case.control.speed
     if "mach" in conditions:
         speed = conditions["mach"] * atmosphere(altitude, geometric).sound_speed
     mass = conditions.get("mass", case.plant.initial.mass)
     truth = Truth(geometric)
-    own_commands = case.control.outer.altitude, case.control.velocity.speed
+    own_commands = case.control.altitude, case.control.speed
     own = trim(*own_commands, case.plant.initial.mass, truth)
     if not own.converged:
         raise ParameterError(f"{name}: there is no trim at its own commands, to start others from")

@@ -11,13 +11,14 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ahv_analysis.command.console import (
     HardwareChoice,
     Json,
+    LawChoice,
     ProfileChoice,
     Reported,
     UsageError,
@@ -32,6 +33,9 @@ from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
 
+if TYPE_CHECKING:  # it takes long to load
+    from ahv_analysis.flight.case import Case
+
 LONGEST_SEARCH = "10s"  # for a dask scheduler
 
 monte_carlo = typer.Typer(
@@ -42,10 +46,14 @@ monte_carlo = typer.Typer(
 
 
 @contextmanager
-def executor_of(workers: int, dask: str | None) -> Iterator[Executor]:
-    """Threads of this process, or a dask cluster."""
+def executor_of(workers: int, dask: str | None, *cases: "Case") -> Iterator[Executor]:
+    """Threads of this process, or a dask cluster; processes where a law is not compiled."""
     if dask is None:
-        pool = ThreadPoolExecutor(workers)
+        from ahv_analysis.campaign.workers import processes
+        from ahv_control.own_law import is_compiled
+
+        compiled = all(is_compiled(case.control) for case in cases)
+        pool = ThreadPoolExecutor(workers) if compiled else processes(workers)
         try:
             yield pool
         finally:
@@ -89,6 +97,7 @@ def fly(
     ] = False,
     hardware: HardwareChoice = None,
     profile: ProfileChoice = None,
+    law: LawChoice = None,
     draws: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="What is drawn besides: distributions in a YAML file."),
@@ -113,12 +122,12 @@ def fly(
         if not 0.0 <= one <= HIGHEST_LEVEL:
             raise UsageError(f"level {one:g} is outside 0 to {HIGHEST_LEVEL:g}")
     name = controller + ("_protected" if protected else "")
-    case = load_case(name, hardware=hardware, profile=profile)
+    case = load_case(name, hardware=hardware, profile=profile, law=law)
     drawn = None if draws is None else load_draws(draws)
     words = [case.name, *words_of(hardware, profile, None if draws is None else draws.stem)]
     folder = out or Path("campaigns") / "-".join(words)
     summaries = []
-    with executor_of(workers, dask) as pool:
+    with executor_of(workers, dask, case) as pool:
         for one in levels:
             campaign = Campaign(case, one, runs, seed, random_starts, drawn)
             with progress_bar(f"{case.name} at {one:g}", runs, as_json, unit="runs") as progress:

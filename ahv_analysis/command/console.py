@@ -54,6 +54,14 @@ ProfileChoice = Annotated[
         help="What is flown, instead of one altitude and speed: a name, or a YAML file.",
     ),
 ]
+LawChoice = Annotated[
+    str | None,
+    typer.Option(
+        "--law",
+        metavar="NAME|FILE",
+        help="Law that flies in the place of the case's: a name, or a Python file.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
@@ -66,7 +74,7 @@ def number(text: str) -> float:
 
 
 def words_of(*choices: str | None) -> list[str]:
-    """Names of hardware and profile, for folders and titles; none for those of the case."""
+    """Names of hardware, profile and such, for folders and titles; none for the case's own."""
     return [Path(choice).stem for choice in choices if choice is not None]
 
 

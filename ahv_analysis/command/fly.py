@@ -17,6 +17,7 @@ from typer.core import TyperCommand
 from ahv_analysis.command.console import (
     HardwareChoice,
     Json,
+    LawChoice,
     ProfileChoice,
     Reported,
     UsageError,
@@ -91,6 +92,7 @@ def fly(
     ] = None,
     hardware: HardwareChoice = None,
     profile: ProfileChoice = None,
+    law: LawChoice = None,
     seed: Annotated[int, integer_option("Seed of the campaign of a draw.")] = 0,
     run: Annotated[int, integer_option("Number of the run of a draw.")] = 0,
     as_json: Json = False,
@@ -120,7 +122,7 @@ def fly(
     changes, draw = _dispersion(dispersion, seed, run, namespace)
     if duration is not None:
         changes["duration"] = duration
-    flight = load_case(case, changes, draw, namespace, hardware, profile)
+    flight = load_case(case, changes, draw, namespace, hardware, profile, law)
     folder = out or Path("flights") / f"{flight.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     bag, summary_file = folder / "bag", folder / "summary.json"
     for path in (bag, summary_file):

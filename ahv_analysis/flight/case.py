@@ -14,6 +14,8 @@ from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
 from ahv_control.guidance import Guidance
 from ahv_control.guidance_parameters import GUIDED, guidance
+from ahv_control.law_file import Law, load_law
+from ahv_control.own_law import Control, OwnLaw
 from ahv_control.parameters import (
     COMMANDED,
     LEARNER_PARAMETERS,
@@ -27,7 +29,7 @@ from ahv_control.parameters import (
 from ahv_msgs_py.case_file import case_names, case_path, read_case_file
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES, case_nodes, controllers
-from ahv_msgs_py.parameters import ParameterError, Value, check_parameters
+from ahv_msgs_py.parameters import Parameter, ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
 from ahv_plant.hardware.wind_parameters import WIND_PARAMETERS
@@ -46,6 +48,7 @@ GUIDED_NODES = [
     for name in case_nodes()
     if any(parameter is GUIDED for parameter in NODES[name].parameters)
 ]
+OWN_LAW = "flight_control"  # the node that flies a law of one's own
 TRUE = ("dispersion.", "disturbance.", "wind.", "gust.", "turbulence.")  # of the plant alone
 
 
@@ -64,15 +67,18 @@ class Case(NamedTuple):
     name: str
     parameters: dict[str, dict[str, Value]]  # of every node, complete and checked
     plant: PlantSettings
-    control: FlightControl
+    control: Control
     draw: Draw | None = None  # of the dispersion among the parameters, if it was drawn
+    law: Law | None = None  # of one's own, in the place of the report's loops
 
     @property
     def controllers(self) -> list[str]:
         """Names of the controller nodes that fly it."""
         control = self.control
         return controllers(
-            adaptive=control.learner is not None, guided=control.guidance is not None
+            adaptive=control.learner is not None,
+            guided=control.guidance is not None,
+            own_law=isinstance(control, OwnLaw),
         )
 
 
@@ -81,6 +87,8 @@ def notes(case: Case) -> str:
     content = {"case": case.name, "parameters": case.parameters, "versions": versions()}
     if case.draw is not None:
         content["draw"] = case.draw._asdict()
+    if case.law is not None:
+        content["law"] = {"name": case.law.name, "source": case.law.identity}
     return json.dumps(content)
 
 
@@ -89,8 +97,9 @@ def read_case(
     namespace: str = NAMESPACE,
     hardware: str | None = None,
     profile: str | None = None,
+    law: str | None = None,
 ) -> tuple[str, dict[str, dict[str, object]]]:
-    """Name of a case, and its parameters by node as case, hardware and profile give them."""
+    """Name of a case, and its parameters by node as case, hardware, profile and law give them."""
     path = Path(name)
     if path.suffix not in (".yaml", ".yml") and name in case_names():
         path = case_path(name)
@@ -105,7 +114,20 @@ def read_case(
     if profile is not None:
         for node, values in load_profile(profile, namespace).items():
             given[node] |= values
+    named = given[OWN_LAW].get("law")
+    if law is not None:
+        given[OWN_LAW] = {"law": _law_place(law)} | (
+            given[OWN_LAW] if named in (None, law) else {}
+        )
+        return f"{path.stem}-{Path(law).stem}", given
+    if isinstance(named, str) and named.endswith(".py"):
+        given[OWN_LAW]["law"] = _law_place(str(path.parent / named))
     return path.stem, given
+
+
+def _law_place(law: str) -> str:
+    """A law as nodes and other processes find it, wherever they were started."""
+    return str(Path(law).resolve()) if law.endswith(".py") else law
 
 
 def load_case(
@@ -115,15 +137,17 @@ def load_case(
     namespace: str = NAMESPACE,
     hardware: str | None = None,
     profile: str | None = None,
+    law: str | None = None,
 ) -> Case:
     """Case of a name in config/cases, or of a file; ParameterError names what is wrong with it.
 
     `plant` replaces parameters of the plant: a dispersion, another start or duration; `draw` says
     where the dispersion comes from, if it was drawn. The file is read as nodes in `namespace` do.
     `hardware` is a name of config/hardware, or a file, and `profile` one of config/profiles;
-    their parameters stand above the case's.
+    their parameters stand above the case's. `law` is the name of a law, or its file, which flies
+    in the place of the case's.
     """
-    name, given = read_case(name, namespace, hardware, profile)
+    name, given = read_case(name, namespace, hardware, profile, law)
     given["plant"] |= plant or {}
     if draw is not None:  # the noise is that of the run, as in the campaign
         given["plant"] |= {"noise.seed": draw.seed, "noise.run": draw.run}
@@ -207,23 +231,44 @@ def load_dispersion(path: Path, namespace: str = NAMESPACE) -> dict[str, object]
 
 
 def make_case(
-    name: str, given: Mapping[str, Mapping[str, object]], draw: Draw | None = None
+    name: str,
+    given: Mapping[str, Mapping[str, object]],
+    draw: Draw | None = None,
+    *,
+    to_fly: bool = True,
 ) -> Case:
-    """Case of the parameters `given` for each node; ParameterError names what is wrong."""
+    """Case of the parameters `given` for each node; ParameterError names what is wrong.
+
+    A case that is not `to_fly` runs no law of anybody's: it tells what was flown, no more.
+    """
+    said = given.get(OWN_LAW, {}).get("law", "")
+    law = load_law(str(said)) if said and to_fly else None
     parameters = {
-        node: check_parameters(f"{name}: {node}", NODES[node].parameters, given.get(node, {}))
+        node: check_parameters(
+            f"{name}: {node}",
+            (*NODES[node].parameters, *_of_law(node, law, given)),
+            given.get(node, {}),
+        )
         for node in case_nodes()
     }
     outer, velocity = parameters["outer_intermediate"], parameters["velocity"]
     held = {"altitude": outer["altitude"], "speed": velocity["speed"]}
-    guiding = parameters["guidance"]
-    guiding |= held | {key: guiding[key] for key in held if key in given.get("guidance", {})}
+    for node in ("guidance", OWN_LAW):
+        said = given.get(node, {})
+        parameters[node] |= held | {key: parameters[node][key] for key in held if key in said}
     plant = plant_settings(parameters["plant"])
+    parameters[OWN_LAW]["surfaces_measured"] = plant.hardware is not None
     if plant.hardware is None:  # surfaces are where they are commanded to be: nobody measures them
         learner = parameters["disturbance_learner"]
         if learner["observer_surfaces"] == MEASURED:
             learner["observer_surfaces"] = COMMANDED
     _check_commands(parameters, plant)
+    guiding = _guidance(name, parameters, plant)
+    if said:
+        values = parameters[OWN_LAW]
+        to_hold = float(values["altitude"]), float(values["speed"])
+        own = OwnLaw(None, *to_hold) if law is None else law.control(values, *to_hold, guiding)
+        return Case(name, parameters, plant, own._replace(guidance=guiding), draw, law)
     adaptive = parameters["inner_loop"]["adaptive"]
     control = FlightControl(
         outer_loop(parameters["outer_intermediate"]),
@@ -231,9 +276,26 @@ def make_case(
         inner_loop(parameters["inner_loop"]),
         velocity_loop(parameters["velocity"]),
         learner_settings(parameters["disturbance_learner"]) if adaptive else None,
-        _guidance(name, parameters, plant),
+        guiding,
     )
     return Case(name, parameters, plant, control, draw)
+
+
+def _of_law(
+    node: str, law: Law | None, given: Mapping[str, Mapping[str, object]]
+) -> tuple[Parameter, ...]:
+    """Settings of a law among the parameters of a node; of one that is not loaded as given."""
+    values = given.get(OWN_LAW, {})
+    if node != OWN_LAW or not values.get("law"):
+        return ()
+    if law is not None:
+        return law.parameters
+    known = {parameter.name for parameter in NODES[OWN_LAW].parameters}
+    return tuple(
+        Parameter(name, value, "setting of the law")
+        for name, value in values.items()
+        if name not in known and isinstance(value, bool | int | float | str)
+    )
 
 
 def _guidance(

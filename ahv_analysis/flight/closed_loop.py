@@ -6,12 +6,12 @@ Element-wise, so that it is the same in plain Python, compiled, and in lanes. Wh
 to be drawn, a bag. The graph's nodes close the same loop by messages.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from ahv_control.disturbance_learner import LearnerState
-from ahv_control.flight_control import FlightControl, start, step
 from ahv_control.guidance import guidance_step, start_guidance
 from ahv_control.law import Commands
+from ahv_control.own_law import Control, is_compiled, start, step
 from ahv_control.reference import Reference
 from ahv_control.route import RouteState
 from ahv_plant.dispersion import Truth
@@ -25,7 +25,7 @@ class Loop(NamedTuple):
     """The closed loop at one step."""
 
     plant: Plant
-    memory: LearnerState | None  # of the flight control
+    memory: Any  # of the flight control
     commands: Commands  # that answer the measurement
     route: RouteState | None  # memory of a guidance by waypoints
     reference: Reference | None  # that the commands follow; None where nothing guides
@@ -33,7 +33,7 @@ class Loop(NamedTuple):
 
 @elementwise
 def start_loop(
-    state: State, truth: Truth, control: FlightControl, draws: Draws | None, rig: Rig | None
+    state: State, truth: Truth, control: Control, draws: Draws | None, rig: Rig | None
 ) -> Loop:
     """Loop at the first state of a flight; without a rig the hardware is ideal."""
     plant = start_plant(state, truth, draws, rig)
@@ -47,7 +47,7 @@ def loop_step(
     loop: Loop,
     number: int,
     truth: Truth,
-    control: FlightControl,
+    control: Control,
     draws: Draws | None,
     rig: Rig | None,
 ) -> Loop:
@@ -62,3 +62,18 @@ def loop_step(
         loop.memory, loop.plant.measured, held, plant.measured, reference, control
     )
     return Loop(plant, memory, commands, route, reference)
+
+
+def loop_of(control: Control) -> tuple[Callable[..., Loop], Callable[..., Loop]]:
+    """`start_loop` and `loop_step` for a law: where it is plain Python, so are they.
+
+    Vehicle and hardware are compiled all the same, to the same bits.
+    """
+    if is_compiled(control):
+        return start_loop, loop_step
+    return _as_python(start_loop), _as_python(loop_step)
+
+
+def _as_python(function: Callable[..., Loop]) -> Callable[..., Loop]:
+    plain: Callable[..., Loop] = getattr(function, "py_func", function)
+    return plain

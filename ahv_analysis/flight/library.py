@@ -10,10 +10,13 @@ from ahv_analysis.bag.rows import Array
 from ahv_analysis.bag.solver_status import lost_status
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
-from ahv_analysis.flight.closed_loop import Loop, loop_step, start_loop
+from ahv_analysis.flight.closed_loop import Loop, loop_of, loop_step, start_loop
 from ahv_analysis.interrupt import signals_wait
+from ahv_control.disturbance_learner import LearnerState
+from ahv_control.law_file import compiling
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.newton_raphson import SolverStatus
+from ahv_control.own_law import Control, is_compiled
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
@@ -30,6 +33,7 @@ from ahv_msgs_py.topics import (
     TRUTH,
     LoopTopic,
 )
+from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.noise import Draws, draws_of
 from ahv_plant.model.constants import STEP, STEP_NS
 from ahv_plant.numerics.elementwise import kernel
@@ -63,18 +67,43 @@ def fly_on(loop, first, steps, truth, control, block, rig):
     return flown
 
 
+def _fly_on(
+    loop: Loop,
+    first: int,
+    steps: int,
+    truth: Truth,
+    control: Control,
+    block: Array | None,
+    rig: Rig | None,
+) -> list[Loop]:
+    """`fly_on` of a law in plain Python."""
+    flown = [loop]
+    _, later = loop_of(control)
+    for row in range(steps):
+        flown.append(later(flown[-1], first + row, truth, control, _drawn(row, block), rig))
+        if termination(flown[-1].plant.state, truth.geometric) != 0:
+            break
+    return flown
+
+
 def fly(case: Case) -> Iterator[Step]:
     """Fly `case`: its steps 0 to N, or fewer if the model no longer describes the vehicle."""
+    with compiling(case.law):
+        yield from _steps(case)
+
+
+def _steps(case: Case) -> Iterator[Step]:
     truth, control, equipped = case.plant.truth, case.control, rig(case.plant.hardware)
     noise = None
     if case.plant.hardware is not None:
         noise = noise_stream(case.plant.hardware, truth.wind, *case.plant.noise)
     block = noise and noise.block(1)
-    loop = start_loop(case.plant.initial, truth, control, _drawn(0, block), equipped)
+    start, on = (start_loop, fly_on) if is_compiled(control) else (loop_of(control)[0], _fly_on)
+    loop = start(case.plant.initial, truth, control, _drawn(0, block), equipped)
     for first in range(0, case.plant.steps, BLOCK):
         steps = min(BLOCK, case.plant.steps - first)
         block = noise and noise.block(steps)
-        flown = fly_on(loop, first, steps, truth, control, block, equipped)
+        flown = on(loop, first, steps, truth, control, block, equipped)
         loop = flown.pop()
         reason = termination_reason(loop.plant.state, truth.geometric, (first + len(flown)) * STEP)
         for number, before in enumerate(flown[:-1], first):
@@ -92,7 +121,7 @@ def _step(number: int, loop: Loop, ended_early: str, equipped: Rig | None) -> St
         number * STEP_NS,
         plant.state,
         loop.commands,
-        loop.memory,
+        loop.memory if isinstance(loop.memory, LearnerState) else None,
         ended_early,
         measured,
         loop.reference,

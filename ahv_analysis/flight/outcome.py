@@ -4,16 +4,19 @@
 Element-wise, so that a run counts the same alone and in a lane.
 """
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
 from ahv_analysis.flight.closed_loop import Loop
 from ahv_control.disturbance_learner import LearnerState
-from ahv_control.flight_control import FlightControl, followed
+from ahv_control.flight_control import FlightControl
+from ahv_control.own_law import Control, OwnLaw, followed, is_compiled
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.wind import through_air
 from ahv_plant.model.constants import STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
+from ahv_plant.numerics.by_type import by_type
 from ahv_plant.numerics.elementary import atan2, atan_ratio
 from ahv_plant.numerics.elementwise import elementwise, kernel, select
 from ahv_plant.termination import termination
@@ -28,6 +31,7 @@ class Cause(IntEnum):
     SURFACES_LOST_THE_VEHICLE = 3  # the Newton step met a singular Jacobian
     INLET_UNSTART = 4  # |alpha| > 5 deg
     LEFT_THE_MASS_MODEL = 5  # the fuel is burnt
+    LAW_FAILED = 6  # it raised, or answered what is no number
 
 
 class Outcome(NamedTuple):
@@ -53,15 +57,25 @@ START = Outcome(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.
 
 
 @elementwise
-def observer_error(state: State, learner: LearnerState | None) -> float:
-    """Largest |X - X_a| [rad/s] of the three channels at a `state` as it was told to the learner.
-
-    Zero without one.
-    """
+def _of_learner(state: State, learner: LearnerState | None, control: FlightControl) -> float:
     if learner is None:
         return select(state.P == state.P, 0.0, 0.0)  # as wide as P
     X_a = learner.X_a
     return max(abs(state.P - X_a.P), abs(state.Q - X_a.Q), abs(state.R - X_a.R))
+
+
+@elementwise
+def _of_none(state: State, memory: object, control: OwnLaw) -> float:
+    return select(state.P == state.P, 0.0, 0.0)
+
+
+def _observer_of(kind: type) -> Callable[..., float]:
+    return _of_none if issubclass(kind, OwnLaw) else _of_learner
+
+
+# observer_error(state, memory, control): largest |X - X_a| [rad/s] of the three channels at a
+# state as it was told to the learner; zero without one
+observer_error = by_type(_observer_of)
 
 
 @elementwise
@@ -71,7 +85,8 @@ def cause_now(state: State, moving: State, status: int, geometric: bool) -> floa
     `moving` has the velocity against the air: the inlet knows no other.
     """
     left = termination(state, geometric)
-    unstart = select(abs(atan2(moving.w, moving.u)) > UNSTART_ALPHA, 4.0, 0.0)
+    failed = select(status == 4, 6.0, 0.0)
+    unstart = select(abs(atan2(moving.w, moving.u)) > UNSTART_ALPHA, 4.0, failed)
     lost = select(status == 3, 3.0, unstart)
     spent = select(left == 3, 5.0, lost)
     outside = select(left == 2, 2.0, spent)
@@ -97,7 +112,7 @@ def first_cause(states, lost, geometric):
 
 @elementwise
 def next_outcome(
-    outcome: Outcome, loop: Loop, number: int, control: FlightControl, truth: Truth
+    outcome: Outcome, loop: Loop, number: int, control: Control, truth: Truth
 ) -> Outcome:
     """Outcome after one more state and its answer; once a run has failed nothing changes.
 
@@ -105,8 +120,8 @@ def next_outcome(
     [m] is that to the reference of `control`.
     """
     state, answer = loop.plant.state, loop.commands
-    wanted = followed(control, loop.reference).altitude
-    observed = observer_error(loop.plant.measured.state, loop.memory)
+    wanted = followed(loop.reference, control).altitude
+    observed = observer_error(loop.plant.measured.state, loop.memory, control)
     moving = through_air(state, number * STEP, loop.plant.turbulence, truth.wind)
     alpha = abs(atan2(moving.w, moving.u))
     v = abs(moving.v)
@@ -139,3 +154,13 @@ def next_outcome(
         select(counts, state.h, outcome.final_altitude),
         select(counts, state.u, outcome.final_speed),
     )
+
+
+def outcome_after(
+    outcome: Outcome, loop: Loop, number: int, control: Control, truth: Truth
+) -> Outcome:
+    """`next_outcome` of any law: one in plain Python may remember what is not compiled."""
+    if not is_compiled(control) and isinstance(control, OwnLaw):
+        told = OwnLaw(None, control.altitude, control.speed, control.guidance)
+        return next_outcome(outcome, loop._replace(memory=None), number, told, truth)
+    return next_outcome(outcome, loop, number, control, truth)

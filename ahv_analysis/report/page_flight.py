@@ -87,7 +87,7 @@ def _read(bag: Path, name: str) -> Flight:
     record, notes = flight_of(contents), contents.notes
     if record.steps < 1:
         raise BagError(f"{bag} holds no two steps with all their messages: there was no flight")
-    case = make_case(notes.case, notes.parameters) if notes else None
+    case = make_case(notes.case, notes.parameters, to_fly=False) if notes else None
     metrics = measure(record, case.control if case else None)
     ended_early = why_ended_early(record, case) if case else ""
     cause = failure(record, ended_early) if case else None

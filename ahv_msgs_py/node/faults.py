@@ -128,8 +128,8 @@ class Fault(Enum):
         error=True,
     )
     SURFACES_SATURATED = Response(
-        "inner_loop",
-        "the solution of the Newton steps lies beyond a stop",
+        "inner_loop, flight_control",
+        "the solution of the Newton steps, or what a law asks for, lies beyond a stop",
         "the surface is held at its stop",
         "at once",
     )
@@ -140,14 +140,21 @@ class Fault(Enum):
         "at once",
     )
     NEWTON_SINGULAR = Response(
-        "inner_loop",
+        "inner_loop, flight_control",
         "the Jacobian of a Newton step is singular",
         "the surfaces stay as they were",
         "at once",
         error=True,
     )
+    LAW_FAILED = Response(
+        "flight_control",
+        "a law of one's own raises, or answers a NaN or an infinity",
+        "the commands before are held while it lasts; a campaign counts the run as failed",
+        "at once",
+        error=True,
+    )
     THROTTLE_SATURATED = Response(
-        "velocity",
+        "velocity, flight_control",
         "the throttle lies at a stop",
         "it is held there",
         "at once",

@@ -66,6 +66,8 @@ class ManagedNode(LifecycleNode):
         self.own_parameters = tuple(parameters)
         self._known = {entry.name: entry for entry in (*parameters, *SHELL_PARAMETERS)}
         try:
+            self.own_parameters += self.further_parameters()
+            self._known |= {entry.name: entry for entry in self.own_parameters}
             self.settings = declare_parameters(self, self._known)
         except ParameterError as error:
             self.refusal = str(error)
@@ -83,6 +85,10 @@ class ManagedNode(LifecycleNode):
         return super().create_timer(period, callback, **options)
 
     # Parameters
+
+    def further_parameters(self) -> tuple[Parameter, ...]:
+        """Parameters that depend on those that were given; ParameterError if there is none."""
+        return ()
 
     def _change(self, parameters: Sequence[RosParameter]) -> SetParametersResult:
         """Take parameters that change in flight; they are in force from the next step on."""

@@ -15,10 +15,13 @@ from typing import Any, TypeVar, cast
 import numba
 from numba import types
 from numba.core import config
+from numba.core.errors import NumbaError as CompilerError
 from numba.extending import overload
 
 from ahv_plant.numerics.cache import keep_machine_code
 from ahv_plant.numerics.identity import Definition, identity
+
+__all__ = ["CompilerError", "composition", "elementwise", "kernel", "select"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Value = TypeVar("Value")
@@ -52,6 +55,7 @@ def _compile(function: Function, **options: bool | str) -> Function:
         root = Definition(source, function.__qualname__.partition(".")[0])
         name = f"{source.stem}.{function.__qualname__}"
         keep_machine_code(dispatcher, name, identity(root, LANES))
+    dispatcher.elementwise = True  # also where the compiler is off
     return cast(Function, dispatcher)  # calls like the function, so type checkers see that
 
 

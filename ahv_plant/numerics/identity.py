@@ -155,6 +155,12 @@ def _follow(definition: Definition) -> tuple[bytes, frozenset[Definition]]:
     return text.encode(), frozenset(source.reached(statements))
 
 
+def read_anew() -> None:
+    """Forget what was read: a source may have changed since."""
+    _source.cache_clear()
+    _follow.cache_clear()
+
+
 def definitions(*roots: Definition) -> dict[Definition, bytes]:
     """All definitions that the `roots` reach, themselves among them, and their texts."""
     found: dict[Definition, bytes] = {}
