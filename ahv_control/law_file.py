@@ -203,7 +203,7 @@ def _loaded(name: str, source: Path, module: str | None, identity: str) -> Law:
         start, step = (getattr(one, "py_func", one) for one in functions.values())
         FUNCTIONS[kind] = plain_functions(start, step, source)
     else:
-        FUNCTIONS[kind] = compiled_functions(functions[START], functions[STEP])
+        FUNCTIONS[kind] = compiled_functions(functions[START], functions[STEP], identity)
     return Law(name, source, identity, settings, parameters, design, kind, why_plain)
 
 

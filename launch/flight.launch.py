@@ -87,10 +87,10 @@ def _nodes(context: LaunchContext) -> list[Node]:
 
     nodes = [node("recorder", [shell | {"bag": str(bag), "notes": notes}])] if record else []
     # guidance starts at the altitude and speed that the loops of the case would hold
-    start = {name: case.parameters["guidance"][name] for name in ("altitude", "speed")}
+    known = {name: case.parameters["guidance"][name] for name in ("altitude", "speed")}
+    of_case = {"guidance": known, "flight_control": case.parameters["flight_control"]}
     nodes += [
-        node(name, [shell | start if name == "guidance" else shell], respawn=realtime)
-        for name in case.controllers
+        node(name, [shell | of_case.get(name, {})], respawn=realtime) for name in case.controllers
     ]
     return [*nodes, node("plant", plant)]
 

@@ -23,6 +23,7 @@ from ahv_msgs_py.node.quality import SENDER_DEPTH
 from ahv_msgs_py.node.rclpy_internals import EventsExecutor
 from ahv_msgs_py.parameters import ParameterError
 from ahv_msgs_py.topics import CLOCK, DIAGNOSTICS, LOOP_TOPICS, ODOMETRY, STATE
+from test.documents import ROOT
 from test.waiting import PATIENCE, wait_until
 
 CASE = load_case("neuro_adaptive_di", {"duration": 20.0})
@@ -128,7 +129,8 @@ def test_in_real_time_what_a_publisher_keeps_has_an_end(graph):
 
 @pytest.mark.parametrize("name", NODES)
 def test_every_node_lives_by_the_standard_lifecycle(name, graph, tmp_path):
-    flown = graph(name, recorder={"bag": str(tmp_path / "bag")})
+    law = {"law": str(ROOT / "examples" / "my_law" / "my_lqr.py")}
+    flown = graph(name, recorder={"bag": str(tmp_path / "bag")}, flight_control=law)
     steps = [
         (Transition.TRANSITION_CONFIGURE, "inactive"),
         (Transition.TRANSITION_ACTIVATE, "active"),

@@ -229,7 +229,7 @@ def test_launched_guidance_starts_where_the_loops_of_the_case_would_stay(launch,
 
 def test_launch_adds_the_learner_to_adaptive_cases(launch):
     nodes = launch(case="neuro_adaptive_di")
-    assert set(nodes) == set(NODES) - {"guidance"}
+    assert set(nodes) == set(NODES) - {"guidance", "flight_control"}
     assert nodes["plant"].parameters[1:] == [LOCKSTEP | {"listeners": 5}]
 
 

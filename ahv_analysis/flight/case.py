@@ -241,8 +241,8 @@ def make_case(
 
     A case that is not `to_fly` runs no law of anybody's: it tells what was flown, no more.
     """
-    said = given.get(OWN_LAW, {}).get("law", "")
-    law = load_law(str(said)) if said and to_fly else None
+    named = given.get(OWN_LAW, {}).get("law", "")
+    law = load_law(str(named)) if named and to_fly else None
     parameters = {
         node: check_parameters(
             f"{name}: {node}",
@@ -254,8 +254,8 @@ def make_case(
     outer, velocity = parameters["outer_intermediate"], parameters["velocity"]
     held = {"altitude": outer["altitude"], "speed": velocity["speed"]}
     for node in ("guidance", OWN_LAW):
-        said = given.get(node, {})
-        parameters[node] |= held | {key: parameters[node][key] for key in held if key in said}
+        own = parameters[node]
+        own |= held | {key: own[key] for key in held if key in given.get(node, {})}
     plant = plant_settings(parameters["plant"])
     parameters[OWN_LAW]["surfaces_measured"] = plant.hardware is not None
     if plant.hardware is None:  # surfaces are where they are commanded to be: nobody measures them
@@ -264,11 +264,11 @@ def make_case(
             learner["observer_surfaces"] = COMMANDED
     _check_commands(parameters, plant)
     guiding = _guidance(name, parameters, plant)
-    if said:
+    if named:
         values = parameters[OWN_LAW]
-        to_hold = float(values["altitude"]), float(values["speed"])
-        own = OwnLaw(None, *to_hold) if law is None else law.control(values, *to_hold, guiding)
-        return Case(name, parameters, plant, own._replace(guidance=guiding), draw, law)
+        to_hold = float(values["altitude"]), float(values["speed"]), guiding
+        flown = OwnLaw(None, *to_hold) if law is None else law.control(values, *to_hold)
+        return Case(name, parameters, plant, flown, draw, law)
     adaptive = parameters["inner_loop"]["adaptive"]
     control = FlightControl(
         outer_loop(parameters["outer_intermediate"]),
