@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from ahv_analysis.command.bag import bag
 from ahv_analysis.command.campaign import monte_carlo, table
+from ahv_analysis.command.compare import compare
 from ahv_analysis.command.console import UsageError, print_json
 from ahv_analysis.command.faults import faults
 from ahv_analysis.command.figures import figures
@@ -35,6 +36,7 @@ IN_ORDER = (
     "monte-carlo",
     "table",
     "map",
+    "compare",
     "faults",
     "trim",
 )
@@ -132,6 +134,7 @@ app.command()(replay)
 app.add_typer(monte_carlo, name="monte-carlo")
 app.command()(table)
 app.command(name="map")(map_rates)
+app.command()(compare)
 app.add_typer(faults, name="faults")
 app.command()(trim)
 
