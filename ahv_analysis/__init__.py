@@ -7,13 +7,13 @@ For a notebook:
 
     flight = ahv.fly("neuro_adaptive_di", dispersion=0.3, seed=1, run=7)
     flight.dataset()
-    ahv.fly_campaign("neuro_adaptive_di", level=0.3, runs=100)
+    ahv.fly_campaign("neuro_adaptive_di", level=0.3, runs=100, hardware="typical")
 """
 
 from importlib import import_module
 from typing import Any
 
-__all__ = ["Flight", "case_names", "fly", "fly_campaign", "read_bag"]
+__all__ = ["Flight", "case_names", "envelope", "fly", "fly_campaign", "fly_map", "read_bag"]
 
 
 def __getattr__(name: str) -> Any:

@@ -26,6 +26,7 @@ DRAWN = {"noise.seed", "noise.run", *(f"dispersion.{name}" for name in Dispersio
 COUNT = 6  # values of an axis, if it is not said
 
 Places = tuple[tuple[str, Parameter], ...]  # nodes, and the parameter of each; none: the level
+Settings = Mapping[str, tuple[Places, object]]  # by the name that was written
 
 
 class Axis(NamedTuple):
@@ -96,13 +97,24 @@ def _places_of_axis(name: str) -> Places:
     return ((WHERE, CONDITIONS[name]),) if name in CONDITIONS else places_of(name)
 
 
-def read_settings(texts: Sequence[str]) -> dict[str, tuple[Places, object]]:
+def read_settings(texts: Sequence[str]) -> Settings:
     """Places and value of each NAME=VALUE; ParameterError says what is wrong with one."""
-    settings = {}
+    values = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name and equals and value):
             raise ParameterError(f"setting {text!r} must be NAME=VALUE")
+        try:
+            values[name] = yaml.safe_load(value)
+        except yaml.YAMLError:
+            raise ParameterError(f"setting {text!r} has a value that is none") from None
+    return settings_of(values)
+
+
+def settings_of(values: Mapping[str, object]) -> Settings:
+    """Places of each name, and its value; ParameterError says what is wrong with one."""
+    settings = {}
+    for name, value in values.items():
         if name == LEVEL.name:
             raise ParameterError("the level is no parameter of a node: it is set by --level")
         if name in (MACH.name, MASS.name):
@@ -110,10 +122,7 @@ def read_settings(texts: Sequence[str]) -> dict[str, tuple[Places, object]]:
                 f"{name} is no parameter of a node: it is set by an axis; --set has "
                 "velocity.speed, initial.mass and the rest of docs/parameters.md"
             )
-        try:
-            settings[name] = places_of(name), yaml.safe_load(value)
-        except yaml.YAMLError:
-            raise ParameterError(f"setting {text!r} has a value that is none") from None
+        settings[name] = places_of(name), value
     return settings
 
 
@@ -131,7 +140,7 @@ def _typed(parameter: Parameter, value: object) -> object:
     return int(value) if whole else value
 
 
-def set_apart(x: Axis, y: Axis, settings: Mapping[str, tuple[Places, object]]) -> None:
+def set_apart(x: Axis, y: Axis, settings: Settings) -> None:
     """Raise ParameterError if two of them set the same."""
     of_axes = [(axis.name, _set_by(axis)) for axis in (x, y)]
     of_settings = [(name, _names(places)) for name, (places, _) in settings.items()]

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ahv_analysis.campaign.axis import Axis, with_value
+from ahv_analysis.campaign.axis import LEVEL, Axis, Settings, read_axis, set_apart, with_value
 from ahv_analysis.campaign.campaign import Campaign, fly_campaign
 from ahv_analysis.campaign.condition import CONDITIONS, Given, at_condition
 from ahv_analysis.campaign.summary import summarize_campaign
-from ahv_analysis.flight.case import make_case
+from ahv_analysis.flight.case import make_case, read_case
 from ahv_analysis.point_file import write_points
 from ahv_msgs_py.parameters import ParameterError
 
@@ -74,6 +74,37 @@ class Map:
     def folder(self, out: Path, x: float, y: float) -> Path:
         """Folder of a point's campaign: a finer map takes what a coarser one flew."""
         return out / "points" / f"{self.x.name}={x:.12g},{self.y.name}={y:.12g}"
+
+
+def read_map(
+    case: str,
+    x: str,
+    y: str,
+    settings: Settings,
+    *,
+    level: float | None,
+    runs: int,
+    seed: int,
+    hardware: str | None = None,
+    profile: str | None = None,
+) -> Map:
+    """Map of a case over axes as `read_axis` reads them; ParameterError names what is wrong.
+
+    `level` [-] is None where an axis sets it, or where it is the usual one. Hardware and profile
+    are as in `load_case`.
+    """
+    axes = read_axis(x), read_axis(y)
+    set_apart(*axes, settings)
+    if LEVEL.name in (axes[0].name, axes[1].name) and level is not None:
+        raise ParameterError(
+            f"level is {level:g} (--level), but an axis sets it already: one of them must go"
+        )
+    chosen = float(LEVEL.check("map", LEVEL.default if level is None else level))
+    name, parameters = read_case(case, hardware=hardware, profile=profile)
+    given: Given = parameters
+    for places, value in settings.values():
+        given = with_value(given, places, value)
+    return Map(name, given, *axes, chosen, runs, seed)
 
 
 class Point(NamedTuple):

@@ -16,7 +16,6 @@ from ahv_analysis.command.console import (
     Json,
     ProfileChoice,
     Reported,
-    UsageError,
     integer_option,
     print_json,
     progress_bar,
@@ -26,7 +25,6 @@ from ahv_analysis.interrupt import interrupted_says, signals_wait
 from ahv_analysis.ranges import RANGE
 
 if TYPE_CHECKING:  # it takes long to load
-    from ahv_analysis.campaign.condition import Given
     from ahv_analysis.campaign.map import Map, Point
 
 AXIS = f"NAME={RANGE}"
@@ -70,23 +68,23 @@ def map_rates(
     and map.json. NAME is a parameter of any node, a shell pattern for several, level, or a flight
     condition: altitude, mach, mass. Where that has no trim, nothing is flown.
     """
-    from ahv_analysis.campaign.axis import LEVEL, read_axis, read_settings, set_apart, with_value
-    from ahv_analysis.campaign.map import Map, fly_map, rates, write_map
-    from ahv_analysis.flight.case import read_case
+    from ahv_analysis.campaign.axis import LEVEL, read_settings
+    from ahv_analysis.campaign.map import fly_map, rates, read_map, write_map
     from ahv_analysis.report.map_figure import draw_map, save_map
 
-    axes = read_axis(x), read_axis(y)
     changes = read_settings(settings or [])
-    set_apart(*axes, changes)
-    by_axis = LEVEL.name in (axes[0].name, axes[1].name)
-    if by_axis and level is not None:
-        raise UsageError("--level and an axis both set the level")
-    chosen = float(LEVEL.check("map", LEVEL.default if level is None else level))
-    name, given = read_case(case, hardware=hardware, profile=profile)
-    parameters: Given = given
-    for places, value in changes.values():
-        parameters = with_value(parameters, places, value)
-    flown = Map(name, parameters, *axes, chosen, runs, seed)
+    flown = read_map(
+        case,
+        x,
+        y,
+        changes,
+        level=level,
+        runs=runs,
+        seed=seed,
+        hardware=hardware,
+        profile=profile,
+    )
+    name, axes = flown.case, (flown.x, flown.y)
     words = words_of(hardware, profile)
     folder = out or Path("maps") / "-".join([name, *words])
     total = runs * len(flown.campaigns)
@@ -105,7 +103,7 @@ def map_rates(
         "hardware": next(iter(words_of(hardware)), None),
         "profile": next(iter(words_of(profile)), None),
         "set": {of: value for of, (_, value) in changes.items()},
-        "level": None if by_axis else chosen,
+        "level": None if LEVEL.name in (flown.x.name, flown.y.name) else flown.level,
         "seed": seed,
         "runs": runs,
         "x": {"name": axes[0].name, "unit": axes[0].unit, "values": axes[0].values},
