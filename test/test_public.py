@@ -108,7 +108,7 @@ def test_multipliers_are_given_by_name():
         ({"case": "nominal_di", "dispersion": {"CX": 1.0}}, "dispersion.CX"),
         ({"case": "nominal_di", "duration": -1.0}, "duration is -1"),
         ({"case": "nominal_di", "hardware": "ideel"}, "hardware 'ideel'"),
-        ({"case": "nominal_di", "profile": "nowhere"}, "profile 'clymb'"),
+        ({"case": "nominal_di", "profile": "nowhere"}, "profile 'nowhere'"),
     ],
 )
 def test_what_is_wrong_is_named(wrong, words):
