@@ -21,6 +21,7 @@ from ahv_analysis.command.fly import CaseCommand, fly
 from ahv_analysis.command.map import map_rates
 from ahv_analysis.command.replay import replay
 from ahv_analysis.command.report import report
+from ahv_analysis.command.sensitivity import sensitivity
 from ahv_analysis.command.trim import trim
 from ahv_analysis.errors import BagError, CampaignError, CampaignStopped, GraphError
 from ahv_msgs_py.parameters import ParameterError
@@ -37,6 +38,7 @@ IN_ORDER = (
     "table",
     "map",
     "compare",
+    "sensitivity",
     "faults",
     "trim",
 )
@@ -135,6 +137,7 @@ app.add_typer(monte_carlo, name="monte-carlo")
 app.command()(table)
 app.command(name="map")(map_rates)
 app.command()(compare)
+app.command()(sensitivity)
 app.add_typer(faults, name="faults")
 app.command()(trim)
 

@@ -3,7 +3,7 @@
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -169,4 +169,15 @@ def show_table(title: str, rows: list[tuple[str, str]]) -> None:
     sheet = Table(show_header=False)
     for name, value in rows:
         sheet.add_row(name, value)
+    console.print(sheet)
+
+
+def show_rows(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table with a head."""
+    print(title)
+    sheet = Table()
+    for name in head:
+        sheet.add_column(name)
+    for row in rows:
+        sheet.add_row(*row)
     console.print(sheet)
