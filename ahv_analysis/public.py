@@ -62,7 +62,7 @@ class Flight:
 
     def summary(self) -> dict[str, Any]:
         """Verdict, extremes and end, as `ahv fly --json` prints them."""
-        return summarize(self.record, self.ended_early)
+        return summarize(self.record, self.ended_early, control=self.case.control)
 
 
 def fly(

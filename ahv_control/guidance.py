@@ -77,11 +77,17 @@ def by_time(memory: None, number: int, guidance: Guidance) -> Reference:
     return aimed(altitude, climb, speed, acceleration, psi, turn, guidance)
 
 
-def _by_place(memory: RouteState, number: int, guidance: Guidance, route: Route) -> Reference:
+@elementwise
+def by_place(memory: RouteState, guidance: Guidance) -> Reference:
+    """Reference at a step of a guidance that leads to waypoints, or to what is selected."""
     altitude, speed, psi = memory.altitude, memory.speed, memory.psi
     return aimed(
         altitude.value, altitude.rate, speed.value, speed.rate, psi.value, psi.rate, guidance
     )
+
+
+def _by_place(memory: RouteState, number: int, guidance: Guidance, route: Route) -> Reference:
+    return by_place(memory, guidance)
 
 
 _reference = optional(_by_place, otherwise=by_time)
@@ -150,10 +156,3 @@ def fastest_turn(guidance: Guidance) -> float:
     steepest = 1.875 if guidance.schedule.smooth else 1.0  # of the quintic in its middle
     rates = np.abs(taking_time[:, 2] - taking_time[:, 1]) / taking_time[:, 3]
     return float(steepest * rates.max(initial=0.0))
-
-
-def warm_up_guidance(guidance: Guidance) -> None:
-    """Guide a step, so that none of a flight waits for the compiler."""
-    state = State(*[1.0] * len(State._fields))
-    memory, _ = start_guidance(state, 0, guidance)
-    guidance_step(memory, state, 1, guidance)

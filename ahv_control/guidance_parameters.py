@@ -14,8 +14,10 @@ from math import isfinite
 import numpy as np
 
 from ahv_control.guidance import Guidance
+from ahv_control.guided_flight import Plan
 from ahv_control.route import Route, Waypoints
 from ahv_control.schedule import KEEPS, Schedule, Transitions
+from ahv_control.selected import RateLimits, Selection
 from ahv_msgs_py.layout import excerpt
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value
 from ahv_plant.model.constants import RADIANS, STEP
@@ -33,7 +35,7 @@ SHAPES = ("smooth", "ramp")
 GUIDED = Parameter("guided", False, "follow /ahv/reference; if false, hold altitude and speed")
 _TRANSITIONS = "VALUE at TIME over TIME [s], one behind the other with ';' between; a step if "
 _TRANSITIONS += "nothing is over"
-GUIDANCE_PARAMETERS = (
+_PARAMETERS = (
     GUIDED,
     Parameter("altitude", 24000.0, "altitude h* at the start", "m", 0.0, 48000.0),
     Parameter("speed", 1786.4, "speed u* at the start", "m/s", 0.0, 8000.0),
@@ -49,6 +51,12 @@ GUIDANCE_PARAMETERS = (
         "to be flown over instead: x NORTH [m] y EAST [m] h ALTITUDE [m] u SPEED [m/s], one "
         "behind the other with ';' between",
     ),
+    Parameter(
+        "selected",
+        "",
+        "in flight, to be flown instead of the profile: h ALTITUDE [m] u SPEED [m/s] psi HEADING "
+        "[deg] or some of the three; what is not named stays as it is",
+    ),
     Parameter("capture_radius", 10e3, "distance within which one is reached", "m", 1.0, 1e6),
     Parameter("build_up", 10.0, "time in which rates are built up to waypoints", "s", 0.1, 1e3),
     Parameter("climb_rate", 15.0, "limit of climbs to waypoints", "m/s", 0.1, 1e3),
@@ -59,6 +67,39 @@ GUIDANCE_PARAMETERS = (
     Parameter("feed_forward", False, "send the rates of the reference; if false, zeros"),
     GEOMETRIC_ALTITUDE,
 )
+AT_START = (GUIDED.name, "altitude", "speed", "heading", GEOMETRIC_ALTITUDE.name)
+GUIDANCE_PARAMETERS = tuple(
+    entry if entry.name in AT_START else entry._replace(in_flight=True) for entry in _PARAMETERS
+)
+
+
+def plan(values: Mapping[str, Value]) -> Plan:
+    """Plan of checked parameters; ParameterError names what does not go together."""
+    limits = RateLimits(
+        float(values["climb_rate"]),
+        float(values["acceleration"]),
+        float(values["turn_rate"]) * RADIANS,
+        float(values["build_up"]),
+    )
+    return Plan(guidance(values), selection(str(values["selected"])), limits)
+
+
+def selection(text: str) -> Selection | None:
+    """What a text selects, None if it is empty; ParameterError names what is wrong with it."""
+    words = text.split()
+    given = dict(zip(words[::2], words[1::2], strict=False))
+    fits = 2 * len(given) == len(words) and given.keys() <= {"h", "u", "psi"}
+    if not fits or not all(re.fullmatch(NUMBER, number) for number in given.values()):
+        raise ParameterError(
+            f"guidance: selected is {excerpt(text)}, but must be like 'h 25000 u 1800 psi 10' or "
+            "have some of these three"
+        )
+    numbers = {name: float(number) for name, number in given.items()}
+    heading = numbers.get("psi")
+    if heading is not None and not abs(heading) <= WIDEST:
+        raise ParameterError(f"guidance: selected: psi must be within {WIDEST:g} deg of north")
+    psi = None if heading is None else heading * RADIANS
+    return Selection(numbers.get("h"), numbers.get("u"), psi) if words else None
 
 
 def guidance(values: Mapping[str, Value]) -> Guidance:

@@ -5,6 +5,7 @@ import rclpy
 
 from ahv_control.held_inputs import held_reference
 from ahv_control.intermediate_loop import rate_command
+from ahv_control.limits_met import limits_met
 from ahv_control.outer_loop import attitude_command
 from ahv_control.parameters import (
     OUTER_INTERMEDIATE_PARAMETERS,
@@ -13,10 +14,12 @@ from ahv_control.parameters import (
 )
 from ahv_control.reference import Reference, held
 from ahv_msgs_py.node.base_node import BaseNode
+from ahv_msgs_py.node.faults import Fault
 from ahv_msgs_py.node.process import run
 from ahv_msgs_py.node.synchronizer import Values
 from ahv_msgs_py.parameters import Value
 from ahv_msgs_py.topics import ATTITUDE_COMMAND, RATE_COMMAND, REFERENCE
+from ahv_plant.model.constants import DEGREES
 from ahv_plant.model.vectors import State
 
 
@@ -50,6 +53,11 @@ class OuterIntermediateNode(BaseNode):
         attitude = attitude_command(state, wanted, self._outer)
         self._send_rates(stamp, rate_command(state, attitude, wanted.psi_rate, self._intermediate))
         self._send_attitude(stamp, attitude)
+        outer = self._outer
+        met = limits_met(state, attitude.theta, outer.climb_limit, outer.alpha_limit)
+        for limit, fault in zip(met, (Fault.CLIMB_LIMITED, Fault.ALPHA_LIMITED), strict=True):
+            if limit:
+                self.fault(stamp, fault, f"theta* is {attitude.theta * DEGREES:.3g} deg")
 
 
 def main() -> None:

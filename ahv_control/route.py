@@ -126,24 +126,37 @@ def first_ahead(state: State, route: Route) -> float:
 
 
 @elementwise
+def climb_and_turn(state: State) -> tuple[float, float]:
+    """Rates of altitude [m/s] and heading [rad/s] of a state, eqs 2.4 and 2.5."""
+    sin_phi, cos_phi = sin_cos(state.phi)
+    sin_theta, cos_theta = sin_cos(state.theta)
+    down = state.v * sin_phi + state.w * cos_phi
+    turn = (state.Q * sin_phi + state.R * cos_phi) / cos_theta
+    return state.u * sin_theta - down * cos_theta, turn
+
+
+@elementwise
 def start_route(
     state: State, number: int, altitude: float, speed: float, psi: float, route: Route
 ) -> RouteState:
     """Route at its first waypoint, from `altitude` [m], u = `speed` [m/s] and `psi` [rad].
 
     A guidance that starts in flight, after `number` steps, goes on from where the vehicle is to
-    the first waypoint ahead: it may have been started again.
+    the first waypoint ahead, climbing and turning as it does: it may have been started again.
     """
     one, under_way = state.u, number > 0
     still = widen(0.0, one)
     ahead = first_ahead(state, route)
+    climb, turn = climb_and_turn(state)
+    climb = clamp(climb, -route.climb_rate, route.climb_rate)
+    turn = clamp(turn, -route.turn_rate, route.turn_rate)
     return RouteState(
         ahead if under_way else still,
         state.x,
         state.y,
-        Led(state.h if under_way else widen(altitude, one), still),
+        Led(state.h if under_way else widen(altitude, one), climb if under_way else still),
         Led(state.u if under_way else widen(speed, one), still),
-        Led(state.psi if under_way else widen(psi, one), still),
+        Led(state.psi if under_way else widen(psi, one), turn if under_way else still),
     )
 
 

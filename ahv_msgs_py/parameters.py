@@ -94,6 +94,15 @@ def ignored(name: str, valid: Iterable[str]) -> str:
     return f"there is no parameter {name!r}; {meant(name, valid)}ignored, as it is for all nodes"
 
 
+def no_parameter(node: str, name: str, valid: Iterable[str]) -> str:
+    """Words on a parameter that a node does not have, while these are `valid`."""
+    names = list(valid)
+    return (
+        f"{node}: there is no parameter {excerpt(name)}; "
+        f"{meant(name, names)}valid are {', '.join(in_groups(names))}"
+    )
+
+
 def check_parameters(
     node: str, parameters: Iterable[Parameter], values: Mapping[str, object]
 ) -> dict[str, Value]:
@@ -101,10 +110,7 @@ def check_parameters(
     known = {parameter.name: parameter for parameter in parameters}
     for name in values:
         if name not in known:
-            raise ParameterError(
-                f"{node}: there is no parameter {excerpt(name)}; "
-                f"{meant(name, known)}valid are {', '.join(in_groups(known))}"
-            )
+            raise ParameterError(no_parameter(node, name, known))
     return {
         name: parameter.check(node, values.get(name, parameter.default))
         for name, parameter in known.items()

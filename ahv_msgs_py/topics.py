@@ -50,7 +50,7 @@ class LoopTopic(NamedTuple):
 
 
 class ViewerTopic(NamedTuple):
-    """A topic for people and their tools; nothing in the loop reads it."""
+    """A topic for people and their tools; no step of the loop waits for it."""
 
     name: str
     type_name: str
@@ -196,6 +196,13 @@ SETTINGS = ViewerTopic(
     None,
     "parameters of every node as JSON, once and again when it starts again",
 )
+SELECTION = ViewerTopic(
+    "/ahv/selection",
+    "sensor_msgs/msg/JointState",
+    None,
+    "altitude [m], speed [m/s], psi [rad], or some of these, for guidance to fly; by anybody",
+    False,
+)
 DIAGNOSTICS = ViewerTopic(
     "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
@@ -214,6 +221,7 @@ VIEWER_TOPICS = (
     TRANSFORM,
     STATIC_TRANSFORM,
     SETTINGS,
+    SELECTION,
     DIAGNOSTICS,
     LOG,
     PARAMETER_EVENTS,

@@ -27,11 +27,11 @@ from ahv_plant.hardware.wind import is_turbulent
 from ahv_plant.hardware.wind_parameters import WIND_PARAMETERS, wind_settings
 from ahv_plant.level_trim import LevelTrim, level_trim
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
+from ahv_plant.model.flight_condition import check_flight_condition
 from ahv_plant.model.vectors import Controls, State, Surfaces
 from ahv_plant.plant import Hardware
 from ahv_plant.safe_command import SAFE_THROTTLE
 from ahv_plant.start import GEOMETRIC_ALTITUDE, START_PARAMETERS
-from ahv_plant.trim import check_flight_condition
 
 FLIGHT_PARAMETERS = (
     Parameter("duration", 150.0, "length of the flight", "s", STEP, 3600.0),

@@ -62,6 +62,7 @@ ROS = {
     "visualization_msgs": "ros-jazzy-common-interfaces",
     "sensor_msgs": "ros-jazzy-common-interfaces",
     "std_msgs": "ros-jazzy-common-interfaces",
+    "std_srvs": "ros-jazzy-common-interfaces",
     "tf2_msgs": None,
 }
 KNOWN = PYTHON | {name: (bundle, name) for name, bundle in ROS.items()}

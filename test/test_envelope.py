@@ -14,10 +14,12 @@ from ahv_analysis.ranges import read_number, read_values
 from ahv_analysis.report.envelope_figure import Grid, draw_envelope
 from ahv_msgs_py.parameters import ParameterError
 from ahv_plant import envelope
-from ahv_plant.envelope import NOT_FOUND, envelope_point
+from ahv_plant.envelope import envelope_point
 from ahv_plant.model.atmosphere import atmosphere
 from ahv_plant.model.constants import DEGREES, INITIAL_MASS
-from ahv_plant.trim import CRUISE_SPEED, trim
+from ahv_plant.model.flight_condition import CRUISE_SPEED
+from ahv_plant.model.limits import NOT_FOUND
+from ahv_plant.trim import trim
 from test.test_command import assert_refused, told
 
 OWN_MACH = CRUISE_SPEED / atmosphere(24000.0, False).sound_speed

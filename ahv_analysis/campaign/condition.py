@@ -17,8 +17,9 @@ from ahv_plant.envelope import why_no_trim
 from ahv_plant.model.aerodynamics import MACH_MINIMUM
 from ahv_plant.model.atmosphere import ALTITUDE_MAXIMUM, ALTITUDE_MINIMUM, atmosphere
 from ahv_plant.model.constants import DEGREES, INITIAL_MASS
+from ahv_plant.model.flight_condition import CRUISE_ALTITUDE, MACH_MAXIMUM
 from ahv_plant.model.mass import MASS_MAXIMUM, MASS_MINIMUM
-from ahv_plant.trim import CRUISE_ALTITUDE, MACH_MAXIMUM, trim
+from ahv_plant.trim import trim
 
 ALTITUDE = Parameter(
     "altitude", CRUISE_ALTITUDE, "of start and command", "m", ALTITUDE_MINIMUM, ALTITUDE_MAXIMUM

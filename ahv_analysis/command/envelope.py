@@ -10,10 +10,11 @@ from typing import Any
 from ahv_analysis.command.console import UsageError, print_json
 from ahv_analysis.ranges import Values, read_values
 from ahv_plant.dispersion import Truth
-from ahv_plant.envelope import LIMITS, NOT_FOUND, EnvelopePoint, envelope_point
+from ahv_plant.envelope import EnvelopePoint, envelope_point
 from ahv_plant.model.aerodynamics import MACH_MINIMUM
 from ahv_plant.model.atmosphere import atmosphere
-from ahv_plant.trim import MACH_MAXIMUM, check_flight_condition
+from ahv_plant.model.flight_condition import MACH_MAXIMUM, check_flight_condition
+from ahv_plant.model.limits import LIMITS, NOT_FOUND
 
 ALTITUDES, MACHS, MASSES = "20:34km", "4:10", "80,110,140t"
 ROWS, COLUMNS = 15, 25  # altitudes and Mach numbers of a range that has no COUNT

@@ -158,7 +158,7 @@ def fly(
     if truth.further is not None:
         summary["dispersion"] |= truth.further._asdict()
     summary["failures"] = failures_in(flight.parameters["plant"])
-    summary |= summarize(record, ended_early, missing)
+    summary |= summarize(record, ended_early, missing, flight.control)
     summary["refused"] = refused_facts(contents)
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     with signals_wait():
@@ -241,6 +241,8 @@ def _print_summary(summary: dict[str, Any]) -> None:
         rows.append((control.replace("_", " "), what))
     for what, since in summary["outside_the_model"].items():
         rows.append(("outside the model", f"{what} from {since:g} s on"))
+    for limit, seconds in summary["limited_s"].items():
+        rows.append(("limited", f"by {limit.replace('_', ' ')} for {seconds:g} s"))
     if summary["refused"]:
         rows.append(("refused", refused_words(summary["refused"])))
     show_table(f"{summary['case']} on the {summary['engine']}", rows)

@@ -16,7 +16,6 @@ from ahv_analysis.command.console import (
 )
 from ahv_analysis.command.envelope import ALTITUDES, MACHS, MASSES, make_envelope
 from ahv_analysis.ranges import RANGE, read_number
-from ahv_plant.envelope import ALPHA, NOT_FOUND
 from ahv_plant.model.atmosphere import atmosphere
 from ahv_plant.model.constants import (
     DEGREES,
@@ -26,7 +25,9 @@ from ahv_plant.model.constants import (
     THROTTLE_MAXIMUM,
     THROTTLE_MINIMUM,
 )
-from ahv_plant.trim import CRUISE_ALTITUDE, CRUISE_SPEED, Trim
+from ahv_plant.model.flight_condition import CRUISE_ALTITUDE, CRUISE_SPEED
+from ahv_plant.model.limits import ALPHA, NOT_FOUND
+from ahv_plant.trim import Trim
 
 DECIMALS = 9  # of what is printed
 

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from ahv_analysis.flight.reach import check_reach
 from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
 from ahv_control.guidance import Guidance
@@ -26,15 +25,17 @@ from ahv_control.parameters import (
     outer_loop,
     velocity_loop,
 )
+from ahv_control.reach import check_reach
 from ahv_msgs_py.case_file import case_names, case_path, read_case_file
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.graph import NODES, case_nodes, controllers
+from ahv_msgs_py.layout import excerpt
 from ahv_msgs_py.parameters import Parameter, ParameterError, Value, check_parameters
 from ahv_msgs_py.topics import NAMESPACE
 from ahv_plant.dispersion import Dispersion
 from ahv_plant.hardware.wind_parameters import WIND_PARAMETERS
+from ahv_plant.model.flight_condition import check_flight_condition
 from ahv_plant.parameters import HARDWARE_PARAMETERS, PlantSettings, plant_settings
-from ahv_plant.trim import check_flight_condition
 
 HARDWARE = {("plant", parameter.name) for parameter in HARDWARE_PARAMETERS + WIND_PARAMETERS}
 HARDWARE |= {
@@ -151,7 +152,13 @@ def load_case(
     given["plant"] |= plant or {}
     if draw is not None:  # the noise is that of the run, as in the campaign
         given["plant"] |= {"noise.seed": draw.seed, "noise.run": draw.run}
-    return make_case(name, given, draw)
+    case = make_case(name, given, draw)
+    selected = str(case.parameters["guidance"]["selected"])
+    if selected:
+        raise ParameterError(
+            f"{name}: guidance: selected is {excerpt(selected)}, but must be empty before a flight"
+        )
+    return case
 
 
 def hardware_names() -> list[str]:
@@ -310,7 +317,7 @@ def _guidance(
     made = guidance(parameters["guidance"])
     if not guided["guidance"]:
         return None
-    check_reach(made, plant)
+    check_reach(made, plant.initial.mass, plant.truth.geometric)
     return made
 
 

@@ -361,9 +361,9 @@ class _Graph:
         if node is None:
             return
         given = [RosParameter(name, value=value) for name, value in change.values.items()]
-        for result in node.set_parameters(given):
-            if not result.successful:
-                raise ParameterError(f"a change in flight cannot be made again: {result.reason}")
+        result = node.set_parameters_atomically(given)  # one by one they may not go together
+        if not result.successful:
+            raise ParameterError(f"a change in flight cannot be made again: {result.reason}")
 
     def _spin(self, seconds: float) -> None:
         if seconds > 0.0:

@@ -12,7 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from ahv_analysis.bag.rows import Array
 from ahv_analysis.ranges import Values
-from ahv_plant.envelope import LIMITS, EnvelopePoint, Limit
+from ahv_plant.envelope import EnvelopePoint
+from ahv_plant.model.limits import LIMITS, Limit
 
 QUANTITIES = (  # field of a point, factor to what is shown, label
     ("alpha_deg", 1.0, "alpha [deg]"),

@@ -9,13 +9,15 @@ from ahv_analysis.bag.reader import Bag
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.bag.rows import BLOCK
 from ahv_analysis.flight.outcome import Cause, first_cause
+from ahv_analysis.report.limited import limited
 from ahv_analysis.report.metrics import fuel, margins
+from ahv_control.own_law import Control
 from ahv_msgs_py.topics import STATE
 from ahv_plant.model.aerodynamics import MACH_MINIMUM
 from ahv_plant.model.constants import DEGREES, STEP_NS
+from ahv_plant.model.flight_condition import MACH_MAXIMUM
 from ahv_plant.model.vectors import State
 from ahv_plant.termination import Termination
-from ahv_plant.trim import MACH_MAXIMUM
 
 OUTSIDE_THE_MODEL = "outside_the_model"  # what would be one, if the vehicle's data held for it
 STEEPEST = 89.0  # [deg] pitch beyond which the Euler angles do not describe the attitude
@@ -30,8 +32,13 @@ def missing_states(bag: Bag, steps: int) -> int:
     return steps + 1 - int(np.count_nonzero(bag.series[STATE].stamps <= steps * STEP_NS))
 
 
-def summarize(record: FlightRecord, ended_early: str, missing: int = 0) -> dict[str, Any]:
-    """Verdict, extremes and end of a flight.
+def summarize(
+    record: FlightRecord,
+    ended_early: str,
+    missing: int = 0,
+    control: Control | None = None,
+) -> dict[str, Any]:
+    """Verdict, extremes and end of a flight; with the settings `control` also its limits.
 
     `ended_early` says why it ended too soon, if so; `missing` how many states are not recorded.
     Success is that of a campaign, and of Table 5.1: flown to the end with |alpha| <= 5 deg
@@ -52,6 +59,7 @@ def summarize(record: FlightRecord, ended_early: str, missing: int = 0) -> dict[
         "cause": cause,
         "ended_early": ended_early,
         "outside_the_model": outside,
+        "limited_s": None if control is None else limited(record, control),
         "max_abs_alpha_deg": angles["alpha"].largest_deg,
         "max_abs_beta_deg": angles["beta"].largest_deg,
         "surface_range_deg": [float(np.min(surfaces)), float(np.max(surfaces))],

@@ -303,6 +303,10 @@ class BaseNode(ManagedNode):
         else:
             self.get_logger().warning(text)
 
+    def refused(self, reason: str) -> None:
+        """Count a change of parameters that was refused."""
+        self.fault(self.now or 0, Fault.CHANGE_REFUSED, reason)
+
     def announce(self, stamp: int, level: bytes, text: str, **facts: object) -> None:
         """Publish a diagnostic status at `stamp` [ns]."""
         name = self.get_fully_qualified_name()

@@ -159,6 +159,39 @@ class Fault(Enum):
         "it is held there",
         "at once",
     )
+    REFERENCE_OUT_OF_REACH = Response(
+        "guidance",
+        "the nominal vehicle, with the mass that is measured, has no level flight at the "
+        "reference, looked for once a second: angle of attack, elevons, throttle, or range of the "
+        "model",
+        "it is followed as far as the vehicle can; a change in flight that leads there is refused",
+        "up to 1 s",
+    )
+    BANK_LIMITED = Response(
+        "guidance",
+        "a turn takes the bank_limit or more",
+        "the bank is held there, and the rest is turned by sideslip",
+        "at once",
+    )
+    CLIMB_LIMITED = Response(
+        "outer_intermediate",
+        "the climb angle asked for is climb_limit or more, or the climb faster than the vehicle, "
+        "which is an argument of 1 or more of the arcsine of eq 3.1",
+        "the climb angle asked for is held at the limit",
+        "at once",
+    )
+    ALPHA_LIMITED = Response(
+        "outer_intermediate",
+        "the pitch that is asked for takes the alpha_limit or more",
+        "the pitch asked for is held where the angle of attack stays within the limit",
+        "at once",
+    )
+    CHANGE_REFUSED = Response(
+        "every node",
+        "a change of parameters in flight that is not valid, or cannot be flown",
+        "nothing is changed; whoever asked is told why, but for selections on a topic",
+        "at once",
+    )
     BARRIER_BREACH = Response(
         "disturbance_learner",
         "an observer error of k_b or more: only after steps that were lost",

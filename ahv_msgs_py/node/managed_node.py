@@ -21,7 +21,14 @@ from ahv_msgs_py.node.rclpy_internals import (
 )
 from ahv_msgs_py.node.ros_parameters import declare_parameters
 from ahv_msgs_py.node.warm_up import Law, warm_up
-from ahv_msgs_py.parameters import SIMULATED_TIME, Parameter, ParameterError, Value, check_time
+from ahv_msgs_py.parameters import (
+    SIMULATED_TIME,
+    Parameter,
+    ParameterError,
+    Value,
+    check_time,
+    no_parameter,
+)
 from ahv_msgs_py.topics import NAMESPACE
 
 REALTIME = Parameter("realtime", False, "100 Hz by the wall clock; if false, lockstep")
@@ -108,6 +115,23 @@ class ManagedNode(LifecycleNode):
         self.settings |= given
         self._changed |= given
         return SetParametersResult(successful=True)
+
+    def set_parameters_atomically(
+        self, parameter_list: Sequence[RosParameter]
+    ) -> SetParametersResult:
+        """Set parameters, as services do that somebody calls; a refusal is told to `refused`."""
+        unknown = [one.name for one in parameter_list if not self.has_parameter(one.name)]
+        if unknown:
+            reason = no_parameter(self.get_name(), unknown[0], self._known)
+            result = SetParametersResult(successful=False, reason=reason)
+        else:
+            result = super().set_parameters_atomically(list(parameter_list))
+        if not result.successful:
+            self.refused(result.reason)
+        return result
+
+    def refused(self, reason: str) -> None:
+        """Hear of a change of parameters that was refused, and why."""
 
     # Lifecycle
 
