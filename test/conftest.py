@@ -30,6 +30,7 @@ FOR_TESTS = (
     "ament_flake8",
     "ament_pep257",
     "catkin_pkg",
+    "control",
     "distributed",
     "hypothesis",
     "markdown_it",

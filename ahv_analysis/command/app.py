@@ -18,6 +18,7 @@ from ahv_analysis.command.console import UsageError, print_json
 from ahv_analysis.command.faults import faults
 from ahv_analysis.command.figures import figures
 from ahv_analysis.command.fly import CaseCommand, fly
+from ahv_analysis.command.linearise import linearise
 from ahv_analysis.command.map import map_rates
 from ahv_analysis.command.replay import replay
 from ahv_analysis.command.report import report
@@ -41,6 +42,7 @@ IN_ORDER = (
     "sensitivity",
     "faults",
     "trim",
+    "linearise",
 )
 UNREAD = 141  # as a shell says of a tool whose reader has gone
 
@@ -140,6 +142,7 @@ app.command()(compare)
 app.command()(sensitivity)
 app.add_typer(faults, name="faults")
 app.command()(trim)
+app.command()(linearise)
 
 
 def _print_version(asked: bool) -> None:

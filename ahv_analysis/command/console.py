@@ -181,3 +181,13 @@ def show_rows(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) ->
     for row in rows:
         sheet.add_row(*row)
     console.print(sheet)
+
+
+def show_columns(title: str, *rows: Sequence[str]) -> None:
+    """Print rows under each other in columns, the first of them a head."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    print("\n".join([title, *lines]))

@@ -119,7 +119,7 @@ def fly(
             "--realtime, --processes, --network and --namespace are for the graph, "
             "not for --engine library"
         )
-    changes, draw = _dispersion(dispersion, seed, run, namespace)
+    changes, draw = chosen_dispersion(dispersion, seed, run, namespace)
     if duration is not None:
         changes["duration"] = duration
     flight = load_case(case, changes, draw, namespace, hardware, profile, law)
@@ -188,7 +188,7 @@ def _engine(processes: bool) -> Callable[..., tuple[str, float]]:
     return fly_processes if processes else partial(fly_graph, leave=last_of_all)
 
 
-def _dispersion(
+def chosen_dispersion(
     choice: str | None, seed: int, run: int, namespace: str
 ) -> tuple[dict[str, object], Any]:
     """Plant parameters of the option --dispersion, and the Draw that they come from, if any."""
