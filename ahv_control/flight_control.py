@@ -16,7 +16,13 @@ from ahv_control.inner_loop import InnerLoop, Learned, adaptive_demand, nominal_
 from ahv_control.intermediate_loop import IntermediateLoop, rate_command
 from ahv_control.law import Commands
 from ahv_control.newton_raphson import nominal_response, solve_surfaces
-from ahv_control.outer_loop import OuterLoop, attitude_command
+from ahv_control.outer_loop import (
+    Integral,
+    OuterLoop,
+    attitude_command,
+    first_integral,
+    next_integral,
+)
 from ahv_control.reference import Reference, held
 from ahv_control.servo_model import (
     ServoModel,
@@ -58,6 +64,13 @@ class FlightControl(NamedTuple):
         return self.velocity.speed
 
 
+class Memory(NamedTuple):
+    """What the loops keep from step to step; None is what a law does without."""
+
+    learner: LearnerState | None
+    integral: Integral | None  # of the altitude
+
+
 def _told(settings: FlightControl, reference: Reference) -> Reference:
     return reference
 
@@ -73,49 +86,61 @@ followed = optional(_told, otherwise=_own)
 @elementwise
 def start(
     measured: Measurement, reference: Reference | None, settings: FlightControl
-) -> tuple[LearnerState | None, Commands]:
-    """Learner, if there is one, and commands at the first measurement of a flight."""
-    learner = first_learner(measured.state, settings.learner)
-    return learner, answer(measured.state, reference, learner, NEUTRAL, settings)
+) -> tuple[Memory, Commands]:
+    """Memory and commands at the first measurement of a flight."""
+    state = measured.state
+    memory = Memory(
+        first_learner(state, settings.learner), first_integral(state, settings.outer.integral)
+    )
+    return memory, answer(state, reference, memory, NEUTRAL, settings)
 
 
 @elementwise
 def step(
-    learner: LearnerState | None,
+    memory: Memory,
     before: Measurement,
     commands: Commands,
     measured: Measurement,
     reference: Reference | None,
     settings: FlightControl,
-) -> tuple[LearnerState | None, Commands]:
-    """Learner and commands at a measurement; `commands` answered the one `before`."""
+) -> tuple[Memory, Commands]:
+    """Memory and commands at a measurement; `commands` answered the one `before`."""
     learner = next_learner(
-        learner, before.state, commands.surfaces, commands.rates, measured, settings.learner
+        memory.learner, before.state, commands.surfaces, commands.rates, measured, settings.learner
     )
-    return learner, answer(measured.state, reference, learner, commands.surfaces, settings)
+    wanted = followed(settings, reference)
+    outer = settings.outer
+    integral = next_integral(memory.integral, measured.state, wanted, outer, outer.integral)
+    later = Memory(learner, integral)
+    return later, answer(measured.state, reference, later, commands.surfaces, settings)
+
+
+def _learned_demand(state: State, rates: Rates, inner: InnerLoop, learner: LearnerState) -> Rates:
+    estimate = disturbance_estimate(learner, Rates(state.P, state.Q, state.R))
+    learned = Learned(learner.X_a, learner.X_d, estimate)
+    demand: Rates = adaptive_demand(state, rates, learned, inner)
+    return demand
+
+
+_demand = optional(_learned_demand, otherwise=nominal_demand)
 
 
 @elementwise
 def answer(
     state: State,
     reference: Reference | None,
-    learner: LearnerState | None,
+    memory: Memory,
     previous: Surfaces,
     settings: FlightControl,
 ) -> Commands:
-    """All commands for `state` with what was learned up to it, if there is a learner.
+    """All commands for `state` with the memory of what was before it.
 
     The `previous` surfaces [rad] were commanded before.
     """
     wanted = followed(settings, reference)
-    attitude = attitude_command(state, wanted, settings.outer)
+    attitude = attitude_command(state, wanted, memory.integral, settings.outer)
     rates = rate_command(state, attitude, wanted.psi_rate, settings.intermediate)
-    if learner is None:
-        demand = nominal_demand(state, rates, settings.inner)
-    else:
-        estimate = disturbance_estimate(learner, Rates(state.P, state.Q, state.R))
-        learned = Learned(learner.X_a, learner.X_d, estimate)
-        demand = adaptive_demand(state, rates, learned, settings.inner)
+    demand = _demand(state, rates, settings.inner, memory.learner)
     surfaces, status = solve_surfaces(state, demand, previous, settings.inner.geometric)
     throttle = throttle_command(state, surfaces, wanted, settings.velocity)
     return Commands(attitude, rates, surfaces, throttle, status)

@@ -6,7 +6,7 @@ import rclpy
 from ahv_control.held_inputs import held_reference
 from ahv_control.intermediate_loop import rate_command
 from ahv_control.limits_met import limits_met
-from ahv_control.outer_loop import attitude_command
+from ahv_control.outer_loop import Integral, attitude_command, first_integral, next_integral
 from ahv_control.parameters import (
     OUTER_INTERMEDIATE_PARAMETERS,
     intermediate_loop,
@@ -24,9 +24,12 @@ from ahv_plant.model.vectors import State
 
 
 class OuterIntermediateNode(BaseNode):
-    """Answers every state, and its reference if guided, with attitude and body-rate command."""
+    """Answers every state, and its reference if guided, with attitude and body-rate command.
 
-    laws = (attitude_command, rate_command)
+    With integral action it remembers that; started again in flight, it begins at none.
+    """
+
+    laws = (attitude_command, rate_command, first_integral, next_integral)
 
     def __init__(
         self, values: dict[str, Value] | None = None, context: rclpy.Context | None = None
@@ -41,16 +44,29 @@ class OuterIntermediateNode(BaseNode):
         self._intermediate = intermediate_loop(settings)
 
     def start(self) -> None:
-        """Open the topics."""
+        """Open the topics; nothing is integrated yet."""
+        self.new_flight()
         self._send_attitude = self.sender(ATTITUDE_COMMAND)
         self._send_rates = self.sender(RATE_COMMAND)
         guided = {REFERENCE: held_reference} if self.settings["guided"] else {}
         self.receive_together(self._answer, guided)
 
+    def new_flight(self) -> None:
+        """Forget the integral of the flight before."""
+        self._started = False
+        self._integral: Integral | None = None
+
     def _answer(self, stamp: int, values: Values, reference: Values | None = None) -> None:
         state = State(*values)
         wanted = Reference(*reference) if reference else self._own
-        attitude = attitude_command(state, wanted, self._outer)
+        if self._started:
+            self._integral = next_integral(
+                self._integral, state, wanted, self._outer, self._outer.integral
+            )
+        else:
+            self._integral = first_integral(state, self._outer.integral)
+            self._started = True
+        attitude = attitude_command(state, wanted, self._integral, self._outer)
         self._send_rates(stamp, rate_command(state, attitude, wanted.psi_rate, self._intermediate))
         self._send_attitude(stamp, attitude)
         outer = self._outer

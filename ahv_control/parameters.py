@@ -9,7 +9,7 @@ from ahv_control.error_dynamics import ErrorDynamics
 from ahv_control.guidance_parameters import GUIDED
 from ahv_control.inner_loop import InnerLoop
 from ahv_control.intermediate_loop import IntermediateLoop
-from ahv_control.outer_loop import OuterLoop
+from ahv_control.outer_loop import AltitudeIntegral, OuterLoop
 from ahv_control.servo_model import ServoModel
 from ahv_control.velocity_loop import VelocityLoop
 from ahv_msgs_py.parameters import Parameter, Value
@@ -56,6 +56,23 @@ OUTER_INTERMEDIATE_PARAMETERS = (
         "deg",
         0.1,
         90.0,
+        in_flight=True,
+    ),
+    Parameter(
+        "k_i_h",
+        0.0,
+        "rate at which integral action takes out an altitude error that stays; 0 is off",
+        "1/s",
+        0.0,
+        1.0,
+    ),
+    Parameter(
+        "integral_limit",
+        10.0,
+        "rate of climb that the integral action never exceeds",
+        "m/s",
+        0.001,
+        1000.0,
         in_flight=True,
     ),
     GUIDED,
@@ -158,11 +175,13 @@ ParameterValues = Mapping[str, Value]
 
 def outer_loop(values: ParameterValues) -> OuterLoop:
     """Outer-loop settings from checked parameters."""
+    gain = float(values["k_i_h"])
     return OuterLoop(
         float(values["altitude"]),
         float(values["k_h"]),
         float(values["alpha_limit"]) * RADIANS,
         float(values["climb_limit"]) * RADIANS,
+        AltitudeIntegral(gain, float(values["integral_limit"])) if gain > 0.0 else None,
     )
 
 

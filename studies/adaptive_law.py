@@ -29,6 +29,7 @@ from ahv_control.disturbance_learner import (
 from ahv_control.error_dynamics import ErrorDynamics, error_decay
 from ahv_control.flight_control import (
     FlightControl,
+    Memory,
     answer,
 )
 from ahv_control.newton_raphson import nominal_response
@@ -62,7 +63,7 @@ class Score(NamedTuple):
 @numba.njit(error_model="numpy")
 def explicit_step(loop: Loop, settings: LearnerSettings) -> LearnerState:
     """Learner one step later by explicit Euler, the obvious way and the wrong one."""
-    learner, before, answered = loop.memory, loop.plant.state, loop.commands
+    learner, before, answered = loop.memory.learner, loop.plant.state, loop.commands
     rates = Rates(before.P, before.Q, before.R)
     response = nominal_response(before, answered.surfaces, settings.geometric)
     estimate = disturbance_estimate(learner, rates)
@@ -100,10 +101,11 @@ def fly_study(
         later = loop_step(loop, number, truth, settings, None, None)
         if explicit:
             learner = explicit_step(loop, settings.learner)
-            commands = answer(later.plant.state, None, learner, before, settings)
-            later = Loop(later.plant, learner, commands)
+            memory = Memory(learner, later.memory.integral)
+            commands = answer(later.plant.state, None, memory, before, settings)
+            later = Loop(later.plant, memory, commands, later.route, later.reference)
         loop = later
-        state, learner, now = loop.plant.state, loop.memory, loop.commands.surfaces
+        state, learner, now = loop.plant.state, loop.memory.learner, loop.commands.surfaces
         a, d = learner.X_a, learner.X_d
         e = max(abs(state.P - a.P), abs(state.Q - a.Q), abs(state.R - a.R))
         largest = max(largest, e)

@@ -131,8 +131,10 @@ def test_with_nothing_learned_and_no_error_both_laws_are_one(state, command):
 def test_protection_keeps_the_commanded_angle_of_attack(state, limit):
     """Pitch command less climb angle is the angle of attack that the vehicle will settle at."""
     reference = straight(30000.0, 1786.4)
-    free = attitude_command(state, reference, OuterLoop(0.0, 0.01, math.pi, math.pi / 2))
-    held = attitude_command(state, reference, OuterLoop(0.0, 0.01, limit * RADIANS, math.pi / 2))
+    free = attitude_command(state, reference, None, OuterLoop(0.0, 0.01, math.pi, math.pi / 2))
+    held = attitude_command(
+        state, reference, None, OuterLoop(0.0, 0.01, limit * RADIANS, math.pi / 2)
+    )
     B = state.v * math.sin(state.phi) + state.w * math.cos(state.phi)
     climb_angle = state.theta - atan(B / state.u)
     assert abs(held.theta - climb_angle) * DEGREES <= limit + 1e-9

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 
 from ahv_control.error_dynamics import ErrorDynamics
-from ahv_control.flight_control import FlightControl, answer
+from ahv_control.flight_control import FlightControl, Memory, answer
 from ahv_control.inner_loop import InnerLoop, nominal_surfaces
 from ahv_control.intermediate_loop import IntermediateLoop, rate_command
 from ahv_control.newton_raphson import (
@@ -52,7 +52,7 @@ def inner_loop(gains):
 @given(STATES, between(20000.0, 30000.0))
 def test_the_commanded_pitch_gives_the_commanded_climb(state, altitude):
     """Eq 3.1 with the plus sign: at theta*, h_dot = k_h (h* - h)."""
-    command = attitude_command(state, held(altitude, 0.0), OUTER)
+    command = attitude_command(state, held(altitude, 0.0), None, OUTER)
     pitched = state._replace(theta=command.theta)
     climb = state_rate(pitched, NEUTRAL, 0.2, 0.0, NOMINAL).h
     assert climb == pytest.approx(0.01 * (altitude - state.h), abs=1e-8)
@@ -153,7 +153,7 @@ def test_at_trim_the_loops_ask_for_trim():
     from ahv_plant.trim import trim
 
     found = trim()
-    attitude = attitude_command(found.state, held(24000.0, 0.0), OUTER)
+    attitude = attitude_command(found.state, held(24000.0, 0.0), None, OUTER)
     assert attitude.theta * DEGREES == pytest.approx(2.9442, abs=1e-4)
     rates = rate_command(found.state, attitude, 0.0, IntermediateLoop(0.2, 0.2, 0.2))
     solution = nominal_surfaces(
@@ -173,8 +173,8 @@ def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous,
     own = held(OUTER.altitude, VELOCITY.speed)
     turning = Reference(24500.0, 1800.0, bank, 0.2, 3.0, 0.1, 0.01)
     for reference, wanted in ((None, own), (own, own), (turning, turning)):
-        commands = answer(state, reference, None, previous, control)
-        assert commands.attitude == attitude_command(state, wanted, OUTER)
+        commands = answer(state, reference, Memory(None, None), previous, control)
+        assert commands.attitude == attitude_command(state, wanted, None, OUTER)
         rates = rate_command(state, commands.attitude, wanted.psi_rate, intermediate)
         assert commands.rates == rates
         surfaces = nominal_surfaces(state, commands.rates, previous, inner)
@@ -187,7 +187,7 @@ def test_the_loops_are_composed_as_the_graph_composes_its_nodes(state, previous,
 def test_no_climb_angle_is_asked_for_beyond_its_limit(state, error, limit):
     """Though the error of altitude asks for more than the whole speed could give."""
     limited = OUTER._replace(climb_limit=limit * RADIANS)
-    command = attitude_command(state, held(state.h + error, 0.0), limited)
+    command = attitude_command(state, held(state.h + error, 0.0), None, limited)
     pitched = state._replace(theta=command.theta)
     climb = state_rate(pitched, NEUTRAL, 0.2, 0.0, NOMINAL).h
     B = state.v * math.sin(state.phi) + state.w * math.cos(state.phi)
@@ -197,7 +197,7 @@ def test_no_climb_angle_is_asked_for_beyond_its_limit(state, error, limit):
 @given(STATES, between(-50.0, 50.0), between(-1.0, 1.0))
 def test_the_rates_of_the_reference_are_added_to_what_the_errors_ask_for(state, climb, faster):
     reference = held(state.h, state.u)._replace(altitude_rate=climb, speed_rate=faster)
-    pitched = state._replace(theta=attitude_command(state, reference, OUTER).theta)
+    pitched = state._replace(theta=attitude_command(state, reference, None, OUTER).theta)
     rate = state_rate(pitched, NEUTRAL, 0.2, 0.0, NOMINAL)
     assert rate.h == pytest.approx(climb, abs=1e-8)
     throttle = throttle_command(state, NEUTRAL, reference, VELOCITY)

@@ -40,7 +40,7 @@ def last_of_flight(state, truth, control, steps):
     loop = widen(start_loop(state, truth, control, None, None), one)
     for number in range(steps):
         loop = widen(loop_step(loop, number, truth, control, None, None), one)
-    return loop.plant.state, loop.memory
+    return loop.plant.state, loop.memory.learner
 
 
 @kernel

@@ -24,7 +24,7 @@ from ahv_control.disturbance_learner import (
     start_learner,
 )
 from ahv_control.error_dynamics import ErrorDynamics
-from ahv_control.flight_control import answer, next_learner
+from ahv_control.flight_control import Memory, answer, next_learner
 from ahv_plant.dispersion import NOMINAL, disturbance_acceleration
 from ahv_plant.model.constants import DEGREES, RADIANS, STEP
 from ahv_plant.model.vectors import Measurement, Rates, Surfaces
@@ -271,7 +271,7 @@ def test_a_surface_at_its_stop_does_not_wind_the_learner_up():
     acceleration = abs(state.Q) / 0.4  # [rad/s^2] mean over the time
     assert acceleration > 0.6
     assert np.max(np.abs(estimate)) < 0.002 * acceleration
-    commands = answer(state, None, learner, stop, case.control)
+    commands = answer(state, None, Memory(learner, None), stop, case.control)
     assert all(math.isfinite(value) for value in commands.surfaces)
 
 

@@ -12,7 +12,7 @@ from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.closed_loop import Loop, loop_of, loop_step, start_loop
 from ahv_analysis.interrupt import signals_wait
-from ahv_control.disturbance_learner import LearnerState
+from ahv_control.flight_control import Memory
 from ahv_control.law_file import compiling
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.newton_raphson import SolverStatus
@@ -121,7 +121,7 @@ def _step(number: int, loop: Loop, ended_early: str, equipped: Rig | None) -> St
         number * STEP_NS,
         plant.state,
         loop.commands,
-        loop.memory if isinstance(loop.memory, LearnerState) else None,
+        loop.memory.learner if isinstance(loop.memory, Memory) else None,
         ended_early,
         measured,
         loop.reference,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ahv_analysis.flight.closed_loop import Loop
 from ahv_control.disturbance_learner import LearnerState
-from ahv_control.flight_control import FlightControl
+from ahv_control.flight_control import FlightControl, Memory
 from ahv_control.own_law import Control, OwnLaw, followed, is_compiled
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.wind import through_air
@@ -57,11 +57,16 @@ START = Outcome(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.
 
 
 @elementwise
-def _of_learner(state: State, learner: LearnerState | None, control: FlightControl) -> float:
+def _of_learner(state: State, learner: LearnerState | None) -> float:
     if learner is None:
         return select(state.P == state.P, 0.0, 0.0)  # as wide as P
     X_a = learner.X_a
     return max(abs(state.P - X_a.P), abs(state.Q - X_a.Q), abs(state.R - X_a.R))
+
+
+@elementwise
+def _of_loops(state: State, memory: Memory, control: FlightControl) -> float:
+    return _of_learner(state, memory.learner)
 
 
 @elementwise
@@ -70,7 +75,7 @@ def _of_none(state: State, memory: object, control: OwnLaw) -> float:
 
 
 def _observer_of(kind: type) -> Callable[..., float]:
-    return _of_none if issubclass(kind, OwnLaw) else _of_learner
+    return _of_none if issubclass(kind, OwnLaw) else _of_loops
 
 
 # observer_error(state, memory, control): largest |X - X_a| [rad/s] of the three channels at a

@@ -42,7 +42,7 @@ def loops_of(settings: Any) -> Loops:
 @elementwise
 def commanded(state: State, reference: Reference, loops: Loops) -> tuple[Attitude, Rates]:
     """Attitude [rad] and rates [rad/s] that the outer and the intermediate loop ask for."""
-    attitude = attitude_command(state, reference, loops.outer)
+    attitude = attitude_command(state, reference, None, loops.outer)
     return attitude, rate_command(state, attitude, reference.psi_rate, loops.intermediate)
 
 
