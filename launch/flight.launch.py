@@ -20,7 +20,7 @@ from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from ahv_analysis.flight.case import load_case, load_dispersion
+from ahv_analysis.flight.case import load_case, load_dispersion, load_hardware, load_profile
 from ahv_msgs_py.config import config_folder
 from ahv_msgs_py.namespace import remappings
 from ahv_msgs_py.topics import NAMESPACE
@@ -30,6 +30,8 @@ DRAIN = 2.0  # [s] for the recorder to take what is still under way
 REFUSED = 2  # exit code of a node that cannot be set up
 ARGUMENTS = {
     "case": ("nominal_di", "Name of a case in share/ahv/config/cases, or path of a YAML file."),
+    "hardware": ("", "ideal, typical, poor, or path of a YAML file; that of the case, if empty."),
+    "profile": ("", "Name of what is flown, in config/profiles, or path of a YAML file."),
     "dispersion": ("", "YAML file of the vehicle's dispersion; that of the case, if empty."),
     "realtime": ("false", "true: 100 Hz by the wall clock; false: lockstep, as fast as it goes."),
     "network": ("false", "true: other machines hear the graph and speak to it; false: none does."),
@@ -58,7 +60,14 @@ def _nodes(context: LaunchContext) -> list[Node]:
     # nodes keep to the loopback interface by themselves, unless a range is set
     wide = {"additional_env": {RANGE: "SUBNET"}} if _truth(given, "network") else {}
     file = _case_file(given["case"])
-    case = load_case(file, namespace=namespace)
+    hardware, profile = given["hardware"] or None, given["profile"] or None
+    case = load_case(file, namespace=namespace, hardware=hardware, profile=profile)
+    above: dict[str, dict[str, object]] = {}  # what stands above the case's parameters
+    for part in (
+        {} if hardware is None else load_hardware(hardware, namespace),
+        {} if profile is None else load_profile(profile, namespace),
+    ):
+        above |= {name: above.get(name, {}) | values for name, values in part.items()}
     plant = []
     if given["dispersion"]:
         plant = [str(_absolute(given["dispersion"]))]
@@ -78,7 +87,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
             name=name,
             namespace=namespace,
             remappings=remappings(namespace),
-            parameters=[file, *parameters],
+            parameters=[file, *filter(None, [above.get(name)]), *parameters],
             output="screen",
             on_exit=_end_of(name, failures, realtime),
             **wide,

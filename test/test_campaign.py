@@ -609,6 +609,7 @@ def test_ctrl_c_keeps_what_was_flown(tmp_path):
         (("monte-carlo", "--runs", 0), ("--runs",)),
         (("monte-carlo", "rerun", "nowhere", 1), ("nowhere", "none")),
         (("table", "--runs", "many"), ("--runs", "many")),
+        (("table", "--profile", "loop"), ("profile 'loop'", "waypoints")),
         (("figures", ".", "--out", "x"), ("not a bag",)),
         (("monte-carlo", "--runs", 1, "--out", sys.executable), ("cannot hold a campaign",)),
     ],

@@ -227,6 +227,23 @@ def test_launched_guidance_starts_where_the_loops_of_the_case_would_stay(launch,
     assert nodes["velocity"].parameters[1:] == [LOCKSTEP]
 
 
+def test_launch_flies_a_profile_on_hardware_as_the_command_does(launch):
+    nodes = launch(profile="waypoints", hardware="typical", case="neuro_adaptive_di")
+    case = load_case("neuro_adaptive_di", hardware="typical", profile="waypoints")
+    assert set(nodes) == {"recorder", "plant", *case.controllers}
+    base = load_case("neuro_adaptive_di").parameters
+    for name in ("plant", *case.controllers):
+        above = nodes[name].parameters[1:-1]
+        assert len(above) <= 1
+        given = base[name] | (above[0] if above else {}) | nodes[name].parameters[-1]
+        known = base[name].keys() - {"listeners"}
+        assert {key: given[key] for key in known} == {
+            key: case.parameters[name][key] for key in known
+        }, name
+    with pytest.raises(ParameterError, match="profile 'loop' is neither"):
+        launch(profile="loop")
+
+
 def test_launch_adds_the_learner_to_adaptive_cases(launch):
     nodes = launch(case="neuro_adaptive_di")
     assert set(nodes) == set(NODES) - {"guidance", "flight_control"}

@@ -19,7 +19,7 @@ from ahv_analysis.report.figures import (
     CHAPTER_4,
     CHAPTER_5,
 )
-from ahv_msgs_py.graph import listeners, sender
+from ahv_msgs_py.graph import NODES, listeners, sender
 from ahv_msgs_py.topics import BY_NAME, LOOP_TOPICS, QUEUE_DEPTH
 from test.waiting import wait_until
 
@@ -76,7 +76,11 @@ def test_the_graph_that_flies_is_the_one_that_is_drawn(domain):
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=domain)
     observer = rclpy.create_node("observer", context=context)
-    drawn = {topic: ({sender(name)}, set(listeners(name))) for name, topic in BY_NAME.items()}
+    elsewhere = {name for name, node in NODES.items() if node.own_law}
+    drawn = {
+        topic: ({sender(name)}, set(listeners(name)) - elsewhere)
+        for name, topic in BY_NAME.items()
+    }
     seen = {}
 
     def number(ends):

@@ -63,6 +63,7 @@ def fly_table(
     interrupted: Callable[[], bool] = lambda: False,
     *,
     hardware: str | None = None,
+    profile: str | None = None,
 ) -> list[Row]:
     """Fly every cell of the table; `runs` replaces the report's numbers of trials.
 
@@ -71,7 +72,8 @@ def fly_table(
     rows = []
     before = 0
     for controller in CONTROLLERS:
-        case = load_case(controller + ("_protected" if protected else ""), hardware=hardware)
+        name = controller + ("_protected" if protected else "")
+        case = load_case(name, hardware=hardware, profile=profile)
         for reported in REPORT:
             campaign = Campaign(case, reported.level, runs or reported.trials, seed)
             fly_campaign(

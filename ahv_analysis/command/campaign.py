@@ -250,6 +250,7 @@ def table(
         bool, typer.Option("--protected", help="With angle-of-attack protection.")
     ] = False,
     hardware: HardwareChoice = None,
+    profile: ProfileChoice = None,
     workers: Workers = CORES,
     dask: Dask = None,
     out: Annotated[Path | None, typer.Option(help="Folder for campaigns and table.")] = None,
@@ -260,8 +261,7 @@ def table(
 
     started = time.perf_counter()
     total = total_runs(runs)
-    words = words_of(hardware)
-    folder = out or Path("campaigns") / "-".join(["table", *words])
+    folder = out or Path("campaigns") / "-".join(["table", *words_of(hardware, profile)])
     with (
         executor_of(workers, dask) as pool,
         progress_bar("Table 5.1", total, as_json, unit="runs") as progress,
@@ -270,14 +270,24 @@ def table(
         interrupted_says(partial(kept_words, reported, total))
         with signals_wait() as interrupted:
             rows = fly_table(
-                folder, pool, seed, runs, protected, reported, interrupted, hardware=hardware
+                folder,
+                pool,
+                seed,
+                runs,
+                protected,
+                reported,
+                interrupted,
+                hardware=hardware,
+                profile=profile,
             )
     name = "table_protected" if protected else "table"
-    title = f"On {words[0]} hardware." if words else "On ideal hardware."
-    text = f"{title}\n\n{markdown(rows)}"
+    (equipped,) = words_of(hardware or "ideal")
+    followed = "".join(f", along {word}" for word in words_of(profile))
+    text = f"On {equipped} hardware{followed}.\n\n{markdown(rows)}"
     (folder / f"{name}.md").write_text(text, encoding="utf-8")
     content = {
-        "hardware": words[0] if words else "ideal",
+        "hardware": equipped,
+        "profile": next(iter(words_of(profile)), None),
         "wall_s": time.perf_counter() - started,
         "rows": [row.flown | {"against_report": row.verdict} for row in rows],
     }
