@@ -76,6 +76,11 @@ class GuidanceNode(BaseNode):
         """Begin with the first waypoint."""
         self._followed = None
 
+    def close(self) -> None:
+        """Close the topics; nothing is flown any more from which a change would go on."""
+        super().close()
+        self._followed = None
+
     def _answer(self, stamp: int, values: Values) -> None:
         state, number = State(*values), stamp // STEP_NS
         self._state, self._number = state, number

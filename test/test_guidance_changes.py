@@ -91,6 +91,22 @@ def test_a_flight_that_resumes_its_route_does_so_from_where_its_reference_is():
 
 
 @pytest.mark.unit
+def test_a_guidance_that_starts_again_in_a_turn_goes_on_to_climb_and_turn_as_the_vehicle_does():
+    """By the rates of heading and altitude that the equations of motion give."""
+    phi, theta = 20.0 * RADIANS, 3.2 * RADIANS
+    turning = CRUISE._replace(phi=phi, theta=theta, Q=0.0005, R=0.0015)
+    rate = state_rate(turning, Surfaces(0.0, 0.0, 0.0), 0.5, 0.0, NOMINAL)
+    mission = planned(waypoints="x 100e3 y 0 h 24500 u 1786.4", feed_forward=True)
+    started = start_followed(turning, 9000, mission).last
+    assert started.psi_rate == pytest.approx(rate.psi, abs=1e-12)
+    assert started.altitude_rate == pytest.approx(rate.h, abs=1e-9)
+    assert 0.0 < rate.psi < 0.15 * RADIANS and 0.0 < rate.h < 15.0, "within the limits"
+    faster = start_followed(turning._replace(R=0.1, theta=0.1), 9000, mission).last
+    assert faster.psi_rate == pytest.approx(0.15 * RADIANS)
+    assert faster.altitude_rate == pytest.approx(15.0)
+
+
+@pytest.mark.unit
 @pytest.mark.parametrize("bank", [0.0, 20.0, 45.0])
 def test_a_steady_turn_is_one_of_the_vehicle_that_flies(bank):
     """By the equations of motion of the plant, which know nothing of steady turns."""
