@@ -1,6 +1,7 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """Figures show what can be read off them."""
 
+from dataclasses import replace
 from io import StringIO
 
 import numpy as np
@@ -10,7 +11,19 @@ from matplotlib import pyplot
 from ahv_analysis.bag.record import record_of
 from ahv_analysis.flight.case import load_case
 from ahv_analysis.flight.library import fly
-from ahv_analysis.report.figures import CHAPTER_3, FLOWN, TUMBLING, draw, write_figure
+from ahv_analysis.report.figures import (
+    ACTUAL,
+    ADAPTIVE,
+    CHAPTER_3,
+    CHAPTER_5,
+    FLOWN,
+    HARDWARE,
+    MEASURED,
+    NOMINAL,
+    TUMBLING,
+    draw,
+    write_figure,
+)
 
 pytestmark = pytest.mark.unit
 
@@ -28,6 +41,41 @@ def test_a_flight_that_is_lost_is_drawn_until_it_tumbles():
         assert np.all(np.abs(flight.air.alpha[flight.time < last]) <= TUMBLING)
         assert max(np.abs(axis.get_ylim())) < 100.0
     pyplot.close(figure)
+
+
+@pytest.mark.parametrize("chapter", ["3", "5", "H"])
+def test_a_legend_explains_every_line_and_covers_nothing(chapter):
+    """It lies within the figure, above all panels and below the title; a command may be lower."""
+    plain = record_of(fly(load_case("nominal_di", {"duration": 0.1})), False)
+    # what hardware adds is what is measured, here without an error
+    flight = replace(plain, measured=plain.states, positions=plain.surfaces)
+    plates, flights = {
+        "3": (CHAPTER_3[3:5], {FLOWN: plain}),
+        "5": (CHAPTER_5[1:3], {NOMINAL: plain, ACTUAL: plain, ADAPTIVE: plain}),
+        "H": (HARDWARE, {MEASURED: flight}),
+    }[chapter]
+    for plate in plates:
+        figure = draw(plate, flights)
+        figure.canvas.draw()
+        title = figure._suptitle.get_window_extent()
+        assert figure.bbox.y0 < title.y0 and title.y1 <= figure.bbox.y1
+        drawn = {
+            line.get_label()
+            for axis in figure.axes
+            for line in axis.lines
+            if not line.get_label().startswith("_")
+        }
+        legends = figure.legends
+        assert len(legends) == (len(drawn) > 1), plate.number
+        for legend in legends:
+            assert {text.get_text() for text in legend.get_texts()} == drawn, plate.number
+            box = legend.get_window_extent()
+            assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1, plate.number
+            assert box.y1 <= title.y0, plate.number
+            panels = [axis.get_tightbbox() for axis in figure.axes]
+            assert not any(box.overlaps(panel) for panel in panels), plate.number
+            assert all(panel.y1 <= box.y0 for panel in panels), plate.number
+        pyplot.close(figure)
 
 
 def test_the_same_flight_gives_the_same_file():

@@ -4,7 +4,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -86,15 +86,19 @@ CHAPTER_4, CHAPTER_5 = (
     for chapter in (4, 5)
 )
 
-FLOWN, NOMINAL, ACTUAL, ADAPTIVE = (
+FLOWN, MEASURED, NOMINAL, ACTUAL, ADAPTIVE = (
     "flight",
+    "measured",
     "nominal law, nominal vehicle",
     "nominal law, actual vehicle",
     "adaptive law, actual vehicle",
 )
-COLOURS = {FLOWN: "C0", NOMINAL: "0.55", ACTUAL: "C3", ADAPTIVE: "C0"}
+COLOURS = {FLOWN: "C0", MEASURED: "C0", NOMINAL: "0.55", ACTUAL: "C3", ADAPTIVE: "C0"}
 COMMAND_STYLE = {"color": "C0", "alpha": 0.6, "linestyle": "--", "linewidth": 1.0}
-TRUE_STYLE = {"color": "k", "linewidth": 1.0}  # seen before noise
+BESIDE_MEASURED: Mapping[str, dict[str, Any]] = {
+    "true": {"color": "k", "linewidth": 1.0},  # seen before the noise
+    "command": {"color": "0.7", "linewidth": 1.0, "zorder": 1},  # noisier, and behind
+}
 
 CAMPAIGN_3, CAMPAIGN_4, CAMPAIGN_5 = (
     tuple(Plate(f"{chapter}.{number}", *subject) for number, subject in enumerate(subjects, first))
@@ -118,7 +122,7 @@ STYLE = {
 
 
 def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
-    """One figure with a line per flight; the last one is the subject, and its commands are dashed.
+    """One figure with a line per flight; the last one is the subject, and its commands are drawn.
 
     A flight is drawn until the vehicle is lost, with a cross there; of flights that were lost or
     ended early only the subject sets the scale.
@@ -145,7 +149,7 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
                 if commanded is not None:
                     command = drawn(flown, commanded[:end])
                     words = panel.quantity.reference_words
-                    style = TRUE_STYLE if words == "true" else COMMAND_STYLE
+                    style = BESIDE_MEASURED[words] if label == MEASURED else COMMAND_STYLE
                     axis.plot(time, command, label=words, **style)
                     seen.append(command)
             _scale(axis, np.concatenate(seen), panel.bound if len(flights) > 1 else None)
@@ -157,21 +161,40 @@ def draw(plate: Plate, flights: Mapping[str, FlightRecord]) -> Figure:
             axis.set_ylabel(panel.quantity.label(panel.unit))
         axes[-1].set_xlabel("time [s]")
         axes[-1].margins(x=0)
-        figure.suptitle(f"Figure {plate.number}: {plate.title}", fontsize=10, x=0.02, ha="left")
         figure.align_ylabels(axes)
-        figure.tight_layout(rect=(0, 0, 1, 0.97 if len(flights) > 1 else 1))
-        handles, labels = axes[0].get_legend_handles_labels()
-        if len(labels) > 1:
-            figure.legend(
-                handles,
-                labels,
+        _explain(figure, f"Figure {plate.number}: {plate.title}", axes)
+    return figure
+
+
+def _explain(figure: Figure, title: str, axes: Sequence[pyplot.Axes]) -> None:
+    """Title and legend above the panels, one below the other, in as many rows as they need."""
+    inch = 1.0 / float(figure.get_figheight())  # in shares of the height
+    top = 1.0 - 0.05 * inch
+    words = figure.suptitle(title, fontsize=10, x=0.02, y=top, ha="left", va="top")
+    words.set_in_layout(False)  # its room is reckoned here
+    top -= words.get_window_extent().height / figure.bbox.height + 0.03 * inch
+    lines = {}  # of any panel: not every one has a command
+    for axis in axes:
+        for line, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            lines.setdefault(label, line)
+    if len(lines) > 1:
+        for columns in range(len(lines), 0, -1):
+            legend = figure.legend(
+                lines.values(),
+                lines.keys(),
                 loc="upper left",
-                bbox_to_anchor=(0.01, 0.955 + 0.003 * len(plate.panels)),
-                ncols=4,
+                bbox_to_anchor=(0.01, top),
+                borderaxespad=0.0,
+                ncols=columns,
                 frameon=False,
                 fontsize=8,
             )
-    return figure
+            extent = legend.get_window_extent()
+            if extent.x1 <= figure.bbox.width or columns == 1:
+                break
+            legend.remove()
+        top -= extent.height / figure.bbox.height
+    figure.tight_layout(rect=(0, 0, 1, top))
 
 
 def draw_campaign(plate: Plate, flights: Sequence[FlightRecord], failed: Sequence[bool]) -> Figure:

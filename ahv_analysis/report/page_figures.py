@@ -24,6 +24,7 @@ from ahv_analysis.report.figures import (
     CHAPTER_5,
     FLOWN,
     HARDWARE,
+    MEASURED,
     NOMINAL,
     Plate,
     draw,
@@ -51,16 +52,19 @@ def flight_figures(
     """
     own = () if flown.positions is None else HARDWARE
     if case is None or flown.learner is None:
-        return CHAPTER_3 + own, partial(draw, flights={FLOWN: flown})
+        return CHAPTER_3 + own, partial(_draw_one, own, flown, {FLOWN: flown})
     nominal = case._replace(control=case.control._replace(learner=None))
     ideal = nominal._replace(plant=case.plant._replace(truth=Truth(case.plant.truth.geometric)))
     plates = CHAPTER_4 if case.control.inner.tracking.exponent == 1.0 else CHAPTER_5
     flights = {NOMINAL: _fly(ideal), ACTUAL: _fly(nominal), ADAPTIVE: flown}
+    return plates + own, partial(_draw_one, own, flown, flights)
 
-    def draw_one(plate: Plate) -> Figure:
-        return draw(plate, {FLOWN: flown} if plate in own else flights)
 
-    return plates + own, draw_one
+def _draw_one(
+    own: Sequence[Plate], flown: FlightRecord, flights: Mapping[str, FlightRecord], plate: Plate
+) -> Figure:
+    """Figures of the flight's `own` hardware show what it measured, the others all flights."""
+    return draw(plate, {MEASURED: flown} if plate in own else flights)
 
 
 def _fly(case: Case) -> FlightRecord:
