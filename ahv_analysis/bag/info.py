@@ -6,7 +6,9 @@ from typing import Any
 
 from ahv_analysis.bag.notes import read_losses
 from ahv_analysis.bag.reader import Bag, flight_of, read
+from ahv_analysis.bag.reported_faults import reported_faults
 from ahv_msgs_py.layout import NANOSECONDS
+from ahv_msgs_py.topics import DIAGNOSTICS
 from ahv_plant.model.constants import STEP_NS
 
 
@@ -15,8 +17,9 @@ def bag_info(path: Path) -> dict[str, Any]:
 
     `complete` is whether every step of the flight is there, from the first one on, and nothing was
     lost before a recovery. `case`, `planned_s` and `notes` are None in a bag without notes.
+    `faults` are the counts that nodes reported.
     """
-    bag = read(path)
+    bag = read(path, keep=[DIAGNOSTICS.name])
     flight = flight_of(bag)
     first, last = int(flight.stamps[0]), int(flight.stamps[-1])
     missing = last // STEP_NS + 1 - len(flight.stamps)
@@ -31,6 +34,7 @@ def bag_info(path: Path) -> dict[str, Any]:
         "steps": flight.steps,
         "missing_steps": missing,
         "refused": refused_facts(bag),
+        "faults": reported_faults(bag.kept[DIAGNOSTICS.name], bag.namespace),
         "recovered": recovered,
         "bytes": bag.bytes,
         "messages": sum(topic.messages for topic in bag.topics.values()),

@@ -58,6 +58,9 @@ def _rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if facts["refused"]:
         rows.append(("refused", refused_words(facts["refused"])))
+    for node, counts in facts["faults"].items():
+        words = (f"{fault.replace('_', ' ')} {count}" for fault, count in counts.items())
+        rows.append(("reported", f"{node}: {', '.join(words)}"))
     if facts["notes"]:
         plant = facts["notes"]["parameters"]["plant"]
         nominal = {parameter.name: parameter.default for parameter in NODES["plant"].parameters}
