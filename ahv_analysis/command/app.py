@@ -20,10 +20,12 @@ from ahv_analysis.command.figures import figures
 from ahv_analysis.command.fly import CaseCommand, fly
 from ahv_analysis.command.linearise import linearise
 from ahv_analysis.command.map import map_rates
+from ahv_analysis.command.rare import rare
 from ahv_analysis.command.replay import replay
 from ahv_analysis.command.report import report
 from ahv_analysis.command.sensitivity import sensitivity
 from ahv_analysis.command.trim import trim
+from ahv_analysis.command.worst import worst
 from ahv_analysis.errors import BagError, CampaignError, CampaignStopped, GraphError
 from ahv_msgs_py.parameters import ParameterError
 
@@ -40,6 +42,8 @@ IN_ORDER = (
     "map",
     "compare",
     "sensitivity",
+    "worst",
+    "rare",
     "faults",
     "trim",
     "linearise",
@@ -140,6 +144,8 @@ app.command()(table)
 app.command(name="map")(map_rates)
 app.command()(compare)
 app.command()(sensitivity)
+app.command()(worst)
+app.command()(rare)
 app.add_typer(faults, name="faults")
 app.command()(trim)
 app.command()(linearise)

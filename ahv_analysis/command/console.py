@@ -143,7 +143,7 @@ class Reported:
 
 @contextmanager
 def progress_bar(
-    title: str, total: int, hidden: bool, unit: str = "steps"
+    title: str, total: int | None, hidden: bool, unit: str = "steps"
 ) -> Iterator[Callable[[int], None]]:
     """Progress on the terminal (stderr); the function it gives takes the work done so far."""
     columns = (
