@@ -58,8 +58,8 @@ from ahv_plant.viewer_pose import (
     Vector,
     enu_pose,
     ned_pose,
-    winged_cone,
 )
+from ahv_plant.winged_cone import body
 
 LONGEST_WAIT = 2.0  # [s] for a listener that has stopped
 VIEWER_PERIOD = 10  # steps between messages for viewers: 10 Hz
@@ -360,7 +360,7 @@ def _marker(stamp: int) -> Marker:
     message.pose.orientation.w = 1.0
     message.scale.x = message.scale.y = message.scale.z = 1.0
     message.color.r, message.color.g, message.color.b, message.color.a = 0.45, 0.5, 0.6, 1.0
-    message.points = [Point(x=x, y=y, z=z) for x, y, z in winged_cone()]
+    message.points = [Point(x=x, y=y, z=z) for x, y, z in body()]
     _head(message.header, stamp, BODY_FRAME)
     return message
 

@@ -1,19 +1,18 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""The vehicle as viewers know it: poses by quaternion in both conventions, and a body to look at.
+"""Poses of the vehicle as viewers know them: by quaternion, in both conventions.
 
 Aerospace: `map_ned` (north, east, down) and `base_link_frd` (forward, right, down). Robotics,
 REP-103: `map` (east, north, up) and `base_link` (forward, left, up). Good enough to look at; the
 control loop uses none of it.
 """
 
-from math import cos, pi, sin
 from typing import NamedTuple
 
 from scipy.spatial.transform import Rotation
 
 from ahv_plant.model.vectors import State
+from ahv_plant.winged_cone import Vector
 
-Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
 
 # Both exchange the first two axes, or turn by half about the first, and are their own inverse.
@@ -56,28 +55,3 @@ def enu_pose(state: State) -> Pose:
 def _quaternion(rotation: Rotation) -> Quaternion:
     x, y, z, w = (float(part) for part in rotation.as_quat())
     return x, y, z, w
-
-
-LENGTH = 61.0  # [m] of the winged cone, nose to tail
-RADIUS = 3.9  # [m] of the cone's base
-HALF_SPAN = 9.144  # [m] half of b, Table 2.1
-ROOT = 24.384  # [m] chord c where the wing leaves the body
-FIN = 8.0  # [m] height of the fin above the axis
-SIDES = 12  # of the cone
-
-
-def winged_cone() -> list[Vector]:
-    """Corners of triangles [m] in `base_link_frd`, three by three: cone, wing and fin."""
-    nose, tail = (0.6 * LENGTH, 0.0, 0.0), -0.4 * LENGTH
-    rim = [
-        (tail, RADIUS * cos(2 * pi * k / SIDES), RADIUS * sin(2 * pi * k / SIDES))
-        for k in range(SIDES)
-    ]
-    corners: list[Vector] = []
-    for one, next_one in zip(rim, rim[1:] + rim[:1], strict=True):
-        corners += [nose, one, next_one, (tail, 0.0, 0.0), next_one, one]
-    front = (tail + ROOT, 0.0, 0.0)
-    for side in (1.0, -1.0):
-        corners += [front, (tail, side * HALF_SPAN, 0.0), (tail, 0.0, 0.0)]
-    corners += [front, (tail, 0.0, -FIN), (tail, 0.0, 0.0)]
-    return corners

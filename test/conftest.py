@@ -9,6 +9,7 @@ from importlib.util import find_spec
 import pytest
 
 from ahv_msgs_py.node.network import keep_to_this_machine
+from test.browsing import browser, visit  # noqa: F401  fixtures
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 keep_to_this_machine()

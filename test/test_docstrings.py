@@ -39,6 +39,7 @@ OWN |= {
     "ahv_plant.termination",
     "ahv_plant.safe_command",
     "ahv_plant.viewer_pose",
+    "ahv_plant.winged_cone",
     "ahv_control.held_inputs",
     "ahv_plant.parameters",
     "ahv_plant.plant",

@@ -2,7 +2,6 @@
 """`ahv report`: metrics against closed forms, and pages as a browser sees them."""
 
 import json
-import os
 import re
 import shutil
 from functools import partial
@@ -11,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import sync_playwright
 from typer.testing import CliRunner
 
 from ahv_analysis.bag.reader import read_bag
@@ -36,7 +34,8 @@ from ahv_analysis.report.page import number, render
 from ahv_analysis.report.page_flight import page_names, read_flights
 from ahv_analysis.report.summary import summarize
 from ahv_plant.model.constants import RADIANS
-from test.waiting import PATIENCE, wait_until
+from test.browsing import wait_for
+from test.waiting import wait_until
 
 TIME = np.arange(10001) * 0.01  # [s] to 100 s
 EVERY = slice(None, -1)  # sample but the last: whole periods
@@ -185,45 +184,6 @@ def pages(bags):
     return json.loads(result.stdout)
 
 
-@pytest.fixture(scope="module")
-def browser():
-    path = shutil.which("chromium") or shutil.which("google-chrome")
-    if path is None:
-        stop = pytest.fail if os.environ.get("CI") == "true" else pytest.skip
-        stop("there is no Chromium to look at the pages with (Debian: apt-get install chromium)")
-    with sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=path, timeout=1e3 * PATIENCE)  # [ms]
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture
-def visit(browser):
-    """Open a page; the function gives the page and what it asked for and complained of."""
-    contexts = []
-
-    def opened(file, **options):
-        contexts.append(browser.new_context(**options))
-        contexts[-1].set_default_timeout(1e3 * PATIENCE)  # [ms]
-        page = contexts[-1].new_page()
-        requests, complaints = [], []
-        page.on("request", lambda request: requests.append(request.url))
-        page.on("console", lambda message: complaints.append(message.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.goto(Path(file).as_uri())
-        wait_for(page, "charts.length === drawings.length")
-        return page, requests, complaints
-
-    yield opened
-    for context in contexts:
-        context.close()
-
-
-def wait_for(page, condition):
-    """Wait until it holds. The page's policy forbids the `eval` with which playwright waits."""
-    wait_until(lambda: page.evaluate(condition), condition, lambda: page.wait_for_timeout(20))
-
-
 def windows(page):
     """Range of time that each plot of a page shows."""
     return page.evaluate("charts.map((chart) => [chart.scales.x.min, chart.scales.x.max])")
@@ -289,7 +249,8 @@ def test_a_page_tells_what_flew(pages):
     for words in ("neuro_adaptive_sc_gdi", "level 0.4, seed 3, run 17", "numba", "Source hash"):
         assert words in page
     assert len(re.findall("data:image/svg", page)) == 5  # figures 5.1 to 5.5
-    assert "Permission is hereby granted" in page  # uPlot's licence goes with uPlot
+    # the licences go with uPlot and three.js
+    assert page.count("Permission is hereby granted") == 2 and "three.js authors" in page
 
 
 def test_a_bag_without_notes_has_a_page_that_says_so(tmp_path):

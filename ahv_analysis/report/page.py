@@ -20,11 +20,21 @@ from ahv_analysis.report.drawn import EXACT, drawn, drawn_time, thinned_to
 from ahv_analysis.report.figures import write_figure
 from ahv_analysis.report.page_figures import flight_figures
 from ahv_analysis.report.page_flight import Flight
+from ahv_analysis.report.page_scene import scene_data, vehicle_data
 from ahv_msgs_py.graph import NODES, case_nodes
 from ahv_msgs_py.parameters import Value
 from ahv_plant.model.constants import STEP
 
-PAGE = "template"  # folder of template, style, script and plotting library
+PAGE = "template"  # folder of template, styles, scripts and libraries
+# each uses those before it
+SCRIPTS = (
+    *("page.js", "cursor.js", "motion.js", "vehicle.js", "trail.js", "orbit.js", "near.js"),
+    *("path.js", "scene.js", "start.js"),
+)
+LIBRARIES = (
+    *("uPlot.min.css", "uPlot.iife.min.js", "uPlot.LICENSE"),
+    *("three.iife.min.js", "three.LICENSE"),
+)
 NONE = "–"  # of what does not apply
 
 
@@ -117,7 +127,10 @@ def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
         "setting": setting,
     }
     folder = files(__package__) / PAGE
-    names = ("page.css", "page.js", "uPlot.min.css", "uPlot.iife.min.js", "uPlot.LICENSE")
+
+    def text(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
     return environment.get_template("page.html").render(
         flights=flights,
         alone=flights[0] if len(flights) == 1 else None,
@@ -129,6 +142,7 @@ def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
         settings=list(_settings(flights)),
         figures=[b64encode(figure.encode()).decode() for figure in figures],
         data=_data(flights),
+        scene=_scene(flights),
         thinned={
             flight.name: span
             for flight in flights
@@ -138,7 +152,8 @@ def render(flights: Sequence[Flight], figures: Sequence[str] = ()) -> str:
         refused={
             flight.name: refused_words(flight.refused) for flight in flights if flight.refused
         },
-        assets={name: (folder / name).read_text(encoding="utf-8") for name in names},
+        assets={name: text(name) for name in ("page.css", "scene.css", *LIBRARIES)},
+        scripts=[text(name) for name in SCRIPTS],
     )
 
 
@@ -253,6 +268,16 @@ def _data(flights: Sequence[Flight]) -> str:
         ],
         "plots": [_plot(one, flights) for group in _groups(flights) for one in group.quantities],
     }
+    return _json(content)
+
+
+def _scene(flights: Sequence[Flight]) -> str:
+    """What scene.js draws, as JSON that can stand within HTML."""
+    moved = [scene_data(flight, _encode) for flight in flights]
+    return _json({"vehicle": vehicle_data(), "flights": moved})
+
+
+def _json(content: dict[str, Any]) -> str:
     return json.dumps(content, allow_nan=False).replace("<", "\\u003c")
 
 

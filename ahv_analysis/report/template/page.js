@@ -1,5 +1,5 @@
 "use strict";
-// Draws the plots of a page. All share one window of time: what moves one moves all.
+// The plots of a page. All share one window of time: what moves one moves all.
 
 const { flights, plots: drawings } = JSON.parse(document.getElementById("data").textContent);
 const COLOURS = ["#2a78d0", "#d9542b", "#1f9d73", "#9256c8", "#c8901c", "#d0488f", "#5b8c1f", "#4aa3b8"];
@@ -12,11 +12,12 @@ const pretty = (value) => {
   return Math.abs(value) < 1e-9 ? "0" : String(Number(value.toPrecision(6))).replace("-", "−");
 };
 
-function decode(text) {
+function floats(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const floats = new Float32Array(bytes.buffer);
-  return Array.from(floats, (value) => (Number.isNaN(value) ? null : value)); // null is a gap
+  return new Float32Array(bytes.buffer);
 }
+
+const decode = (text) => Array.from(floats(text), (value) => (Number.isNaN(value) ? null : value)); // null is a gap
 
 const times = flights.map((flight) => decode(flight.time));
 const whole = {
@@ -31,6 +32,7 @@ function show(min, max) {
   const start = Math.min(Math.max(min, whole.min), whole.max - length);
   shown = { min: start, max: start + length };
   for (const chart of charts) chart.setScale("x", shown);
+  place();
 }
 
 // Extremes in sight of each line up to a time [s] of its flight.
@@ -156,11 +158,6 @@ function follow(chart) {
   if (charts.includes(chart) && (min !== shown.min || max !== shown.max)) show(min, max);
 }
 
-function readOff(chart) {
-  const index = chart.cursor.idx;
-  document.getElementById("cursor").textContent = index == null ? "" : `t = ${chart.data[0][index].toFixed(2)} s`;
-}
-
 // Two fingers pinch and pan, as does a mouse with Shift; one finger reads off.
 function handle(chart) {
   const over = chart.over;
@@ -181,7 +178,7 @@ function handle(chart) {
     const pointers = [...now.keys()];
     if (pointers.length === 1 && event.pointerType !== "mouse") {
       const time = chart.posToVal(now.get(pointers[0]), "x");
-      for (const other of charts) other.setCursor({ left: other.valToPos(time, "x"), top: -1 });
+      seek(time);
       return;
     }
     const [a, b] = pointers.map((pointer) => ({ x: now.get(pointer), time: held.get(pointer) }));
@@ -204,15 +201,3 @@ function handle(chart) {
     show(time - (time - shown.min) * factor, time + (shown.max - time) * factor);
   }, { passive: false });
 }
-
-for (const swatch of document.querySelectorAll(".swatch")) {
-  swatch.style.color = colour(Number(swatch.dataset.flight));
-}
-for (const figure of document.querySelectorAll(".plot")) build(figure);
-for (const button of document.querySelectorAll("button[data-until]")) {
-  button.addEventListener("click", () =>
-    show(whole.min, button.dataset.until ? whole.min + Number(button.dataset.until) : whole.max));
-}
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-  for (const chart of charts) chart.redraw(false);
-});
