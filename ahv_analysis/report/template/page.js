@@ -148,6 +148,10 @@ function build(figure) {
     figure,
   );
   charts.push(chart);
+  figure.addEventListener("keydown", steer);
+  const canvas = chart.root.querySelector("canvas"); // to those who do not see it the readings beside it say more
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", `Curves of ${drawing.name} over time`);
   handle(chart);
   new ResizeObserver(() => chart.setSize({ width: figure.clientWidth, height: HEIGHT })).observe(figure);
 }
