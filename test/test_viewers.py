@@ -198,6 +198,9 @@ def test_the_view_in_three_dimensions_follows_the_frames_of_the_bag(foxglove, me
     odometry = messages["/ahv/odometry"]
     assert view["followTf"] == odometry["child_frame_id"]
     assert view["layers"]["grid"]["frameId"] == odometry["header"]["frame_id"]
+    assert view["topics"]["/ahv/vehicle_marker"]["visible"]
+    marker = messages["/ahv/vehicle_marker"]
+    assert marker["header"]["frame_id"] == view["followTf"] and marker["points"]
     assert "/tf" in messages  # where tf2_msgs is installed there are messages, too
 
 
