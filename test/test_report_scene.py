@@ -118,6 +118,19 @@ def test_the_camera_turns_by_mouse_and_keys_and_comes_back(pages, visit):
     assert "Heights" in page.locator(".view-note").inner_text()
 
 
+def test_commands_are_held_and_signals_are_not(pages, visit):
+    page, _, _ = visit(pages / "short.html")
+    held = {
+        name: page.evaluate(
+            f"String(charts[{index}].series[1].paths) === String(uPlot.paths.stepped({{}}))"
+        )
+        for index, name in enumerate(page.evaluate("drawings.map((drawing) => drawing.name)"))
+    }
+    assert {name for name, stepped in held.items() if stepped} == {
+        *("right elevon", "left elevon", "rudder", "throttle")
+    }
+
+
 def test_a_lost_vehicle_is_called_lost_from_where_it_tumbles(flights, pages, visit):
     page, _, complaints = visit(pages / "lost.html")
     record = flights[1].record

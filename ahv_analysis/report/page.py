@@ -297,6 +297,7 @@ def _plot(one: Quantity, flights: Sequence[Flight]) -> dict[str, Any]:
     return {
         "name": one.words,
         "referenceName": one.reference_words,
+        "held": one in CONTROLS,  # from one step to the next
         "bounds": bounds.pop() if len(bounds) == 1 else None,
         "lines": lines,
     }

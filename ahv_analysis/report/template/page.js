@@ -93,6 +93,7 @@ function series(drawing, line) {
     dash: line.reference ? [5, 4] : undefined,
     alpha: !alone && line.reference ? 0.6 : 1,
     points: { show: false },
+    paths: drawing.held ? uPlot.paths.stepped({ align: 1 }) : undefined,
     pxAlign: 0,
     value: (chart, value) => pretty(value),
   };
