@@ -188,6 +188,11 @@ def _padded(record: FlightRecord, index: int) -> Array:
     return np.pad(record.actual_disturbance[:, index], (0, 1), mode="edge")
 
 
+def _asked(commands: Rows, index: int) -> Array | None:
+    """A column of commands; None of a law that commands none, which are zero then throughout."""
+    return commands[:, index] if any(np.any(commands[:, other]) for other in range(3)) else None
+
+
 def _velocity(name: str, words: str) -> Quantity:
     one = _recorded(STATE, name, name, words, name, "m/s", BODY_FRAME)
     return one._replace(plate="velocity")
@@ -199,7 +204,7 @@ def _rate(index: int, name: str, words: str) -> Quantity:
         shown="deg/s",
         plate="rates",
         group="Rates",
-        reference=lambda record, settings: record.rate_commands[:, index],
+        reference=lambda record, settings: _asked(record.rate_commands, index),
         band=0.1,
     )
 
@@ -210,7 +215,7 @@ def _angle(index: int, name: str, words: str, symbol: str) -> Quantity:
         shown="deg",
         plate="attitude",
         group="Attitude",
-        reference=lambda record, settings: record.attitude_commands[:, index],
+        reference=lambda record, settings: _asked(record.attitude_commands, index),
         band=0.25,
     )
 

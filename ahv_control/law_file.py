@@ -49,6 +49,7 @@ ARGUMENTS = {
 }
 # `gain: float = 2.0  # [1/s] of the pitch rate`
 FIELD = re.compile(r"\s*(\w+)\s*:[^#]*#\s*(?:\[([^]]*)\])?\s*(.*)")
+TELLING = ("Unknown attribute", "NameError", "Invalid use of", "Use of unsupported")  # of errors
 LONGEST = 1_000_000  # [bytes] of a source that is read at all
 
 
@@ -312,7 +313,12 @@ def _not_compiled(law: Law, error: CompilerError) -> ParameterError:
         if Path(file).name == law.source.name
     ]
     said = [line.strip() for line in str(error).splitlines() if line.strip()]
-    words = next((line for line in said if not line.startswith("Failed in")), "")
+    words = next(
+        (line for line in reversed(said) if line.startswith(TELLING)),
+        next((line for line in said if not line.startswith("Failed in")), ""),
+    )
+    if "Cannot unify Loop(" in str(error):
+        words = "the memories that start and step answer are not of one type"
     where = f", line {lines[-1]}" if lines else ""
     return ParameterError(
         f"{law.source.name}{where}: it cannot be compiled ({words[:300]}); "

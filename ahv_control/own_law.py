@@ -210,6 +210,8 @@ def plain_functions(
 
 def _numbers(answered: Commands) -> Commands:
     """An answer in plain numbers, whatever numbers the law reckons with."""
+    if not isinstance(answered, Commands):
+        raise TypeError(f"its answer is {type(answered).__name__}, and not Commands")
     attitude, rates, surfaces, throttle, status = answered
     return Commands(
         Attitude(*map(float, attitude)),

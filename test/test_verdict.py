@@ -5,7 +5,7 @@ import pytest
 
 from ahv_analysis.bag.reader import read_bag
 from ahv_analysis.bag.record import record_of
-from ahv_analysis.bag.solver_status import lost_status, surfaces_lost_at
+from ahv_analysis.bag.solver_status import losses_in, lost_status
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.campaign.batch import fly_alone
 from ahv_analysis.flight.case import load_case
@@ -98,9 +98,9 @@ def test_another_inner_loop_is_not_judged_by_our_solver(tmp_path):
 def test_only_the_inner_loop_of_the_flight_is_believed():
     word = lost_status(0)
     ours = 1, word.replace(b"newton singular", b"all is healthy.")
-    assert surfaces_lost_at([(1, word)], NAMESPACE) == 0
-    assert surfaces_lost_at([(1, word)], "/another") is None, "another vehicle"
-    assert surfaces_lost_at([(1, word.replace(b"inner", b"outer"))], NAMESPACE) is None
-    assert surfaces_lost_at([ours, (2, word), ours], NAMESPACE) is None, "another publisher"
-    assert surfaces_lost_at([ours, (2, word)], NAMESPACE) == 0, "one that was started again"
-    assert surfaces_lost_at([(1, word[:20])], NAMESPACE) is None, "no message"
+    assert losses_in([(1, word)], NAMESPACE).surfaces == 0
+    assert losses_in([(1, word)], "/another").surfaces is None, "another vehicle"
+    assert losses_in([(1, word.replace(b"inner", b"outer"))], NAMESPACE).surfaces is None
+    assert losses_in([ours, (2, word), ours], NAMESPACE).surfaces is None, "another publisher"
+    assert losses_in([ours, (2, word)], NAMESPACE).surfaces == 0, "one that was started again"
+    assert losses_in([(1, word[:20])], NAMESPACE).surfaces is None, "no message"

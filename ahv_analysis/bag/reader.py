@@ -19,7 +19,7 @@ from ahv_analysis.bag.plain_file import ZSTD_MAGIC, PlainFile, UnpackError
 from ahv_analysis.bag.record import FlightRecord
 from ahv_analysis.bag.rows import Rows, part_of
 from ahv_analysis.bag.series import AmbiguousError, Collector, Refused, Series
-from ahv_analysis.bag.solver_status import says_inner_loop, surfaces_lost_at
+from ahv_analysis.bag.solver_status import Losses, losses_in, says_a_law
 from ahv_analysis.errors import BagError
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
@@ -66,7 +66,7 @@ class Bag(NamedTuple):
     refused: list[Refused]  # messages of the control loop that no receiver obeyed
     kept: dict[str, list[bytes]]  # messages of the topics asked for, CDR
     namespace: str  # of the vehicle that flew
-    surfaces_lost_at: int | None  # [ns] when its inner loop said so first
+    losses: Losses  # of the flight, as its law told of them
 
 
 class Recorded(NamedTuple):
@@ -129,7 +129,7 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
         elif name in kept:
             kept[name] += [data for _, data in portion.bodies()]
         if (name, portion.type_name) == (DIAGNOSTICS.name, DIAGNOSTICS.type_name):
-            diagnostics += [entry for entry in portion.bodies() if says_inner_loop(entry[1])]
+            diagnostics += [entry for entry in portion.bodies() if says_a_law(entry[1])]
     namespace = _namespace(found.path, topics)
     series: dict[LoopTopic, Series] = {}
     refused: list[Refused] = []
@@ -158,7 +158,6 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
         custom = custom_of_record(own[0]) if own else {}
     notes = read_notes(custom) or told_notes(told.get(within(namespace, SETTINGS.name), []))
     size = sum(file.stat().st_size for file in found.files)
-    lost_at = surfaces_lost_at(diagnostics, namespace)
     return Bag(
         found.path,
         size,
@@ -169,7 +168,7 @@ def read(path: Path, keep: Collection[str] = ()) -> Bag:
         refused,
         kept,
         namespace,
-        lost_at,
+        losses_in(diagnostics, namespace),
     )
 
 
@@ -298,10 +297,11 @@ def flight_of(bag: Bag) -> FlightRecord:
         bag.notes is not None and bag.notes.geometric,
         rows.get(LEARNER),
         None if estimates is None else part_of(estimates, slice(None), slice(3, None)),
-        bag.surfaces_lost_at,
+        bag.losses.surfaces,
         None if truth is None else rows[STATE],
         rows.get(SURFACES),
         rows.get(REFERENCE),
+        bag.losses.law,
     )
 
 

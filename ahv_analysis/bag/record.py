@@ -57,6 +57,7 @@ class FlightRecord:
         None  # (N+1, 3) [rad] of the surfaces as measured, None if as commanded
     )
     references: Rows | None = None  # (N+1, 7) in the order of Reference, None without guidance
+    law_failed_at: int | None = None  # [ns] when a law of one's own first had no answer
 
     @property
     def steps(self) -> int:
@@ -86,6 +87,7 @@ class FlightRecord:
                 None if self.measured is None else self.measured[part],
                 None if self.positions is None else self.positions[part],
                 None if self.references is None else self.references[part],
+                self.law_failed_at,
             )
 
     def column(self, name: str) -> Array:
@@ -170,6 +172,7 @@ class Step(NamedTuple):
     ended_early: str  # why this is the last step before its time; empty if it is not
     measured: Measurement | None  # None with ideal hardware: the state, and surfaces as commanded
     reference: Reference | None = None  # that is followed; None where nothing guides
+    own_law: bool = False  # a law of one's own answered
 
     @property
     def told(self) -> State:
@@ -189,11 +192,15 @@ def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
     states, learners = GrowingRows(len(State._fields)), GrowingRows(len(LEARNER_NAMES))
     attitudes, rates, surfaces, estimates, positions = (GrowingRows(3) for _ in range(5))
     measured, references = GrowingRows(len(State._fields)), GrowingRows(len(Reference._fields))
-    adaptive, equipped, guided, lost_at = False, False, False, None
+    adaptive, equipped, guided = False, False, False
+    lost_at: int | None = None
+    failed_at: int | None = None
     for step in steps:
         stamps.append(step.stamp)
         if lost_at is None and step.commands.status == SolverStatus.SINGULAR:
             lost_at = step.stamp
+        if failed_at is None and step.commands.status == SolverStatus.NO_ANSWER:
+            failed_at = step.stamp
         states.append(step.state)
         attitudes.append(step.commands.attitude)
         rates.append(step.commands.rates)
@@ -224,4 +231,5 @@ def record_of(steps: Iterable[Step], geometric: bool) -> FlightRecord:
         measured.rows() if equipped else None,
         positions.rows() if equipped else None,
         references.rows() if guided else None,
+        failed_at,
     )

@@ -1,12 +1,14 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""What the inner loop says of its solver on /diagnostics: written for a library flight, and found.
+"""What a law says of its answers on /diagnostics: written for a library flight, and found.
 
 Only the inner loop itself knows whether its surfaces could turn the vehicle. One with another law
-may say nothing of it, and nobody solves its steps again to judge it.
+may say nothing of it, and nobody solves its steps again to judge it. Of a law of one's own, which
+flies as one node, it is this node's word; and that the law gave no answer.
 """
 
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,16 +21,35 @@ from ahv_msgs_py.node.health import ERROR
 from ahv_msgs_py.topics import DIAGNOSTICS, NAMESPACE, SURFACE_COMMAND, relative
 
 INNER_LOOP = sender(relative(SURFACE_COMMAND.name))
-LOST = Fault.NEWTON_SINGULAR.name.lower().replace("_", " ")
+OWN_LAW = "flight_control"
+LOST, FAILED = (
+    fault.name.lower().replace("_", " ") for fault in (Fault.NEWTON_SINGULAR, Fault.LAW_FAILED)
+)
 
 
-def lost_status(stamp: int) -> bytes:
-    """The inner loop's word at `stamp` [ns] that its surfaces cannot turn the vehicle, as CDR."""
+class Losses(NamedTuple):
+    """When a flight was lost by its law, as the law tells it; None if it was not."""
+
+    surfaces: int | None  # [ns] when the surfaces first could not turn the vehicle
+    law: int | None  # [ns] when the law first had no answer
+
+
+def lost_status(stamp: int, own_law: bool = False) -> bytes:
+    """The word at `stamp` [ns] that the surfaces cannot turn the vehicle, as CDR."""
+    return _status(stamp, OWN_LAW if own_law else INNER_LOOP, f"{LOST}: Newton-Raphson")
+
+
+def failed_status(stamp: int, why: str) -> bytes:
+    """The word at `stamp` [ns] that a law of one's own had no answer, and why, as CDR."""
+    return _status(stamp, OWN_LAW, f"{FAILED}: {why}")
+
+
+def _status(stamp: int, node: str, text: str) -> bytes:
     types = STORE.types
     status = types["diagnostic_msgs/msg/DiagnosticStatus"](
         level=ERROR[0],
-        name=f"{NAMESPACE}/{INNER_LOOP}",
-        message=f"{LOST}: Newton-Raphson",
+        name=f"{NAMESPACE}/{node}",
+        message=text,
         hardware_id="ahv",
         values=[],
     )
@@ -38,18 +59,24 @@ def lost_status(stamp: int) -> bytes:
     return bytes(STORE.serialize_cdr(message, DIAGNOSTICS.type_name))
 
 
-def says_inner_loop(data: bytes) -> bool:
-    """Whether CDR bytes of /diagnostics can be of the inner loop of any vehicle."""
-    return f"/{INNER_LOOP}\0".encode() in data
+def says_a_law(data: bytes) -> bool:
+    """Whether CDR bytes of /diagnostics can be of the law of any vehicle."""
+    return any(f"/{node}\0".encode() in data for node in (INNER_LOOP, OWN_LAW))
 
 
-def surfaces_lost_at(messages: Sequence[tuple[int, bytes]], namespace: str) -> int | None:
-    """Stamp [ns] of the first loss that the inner loop of a namespace tells of; None if none.
+def losses_in(messages: Sequence[tuple[int, bytes]], namespace: str) -> Losses:
+    """First losses that the law of a namespace tells of.
 
     `messages` of /diagnostics come with the numbers of their publishers. They are believed as
     commands are: of the publisher that spoke first under this name, until its last message.
     """
-    name = f"{namespace}/{INNER_LOOP}"
+    lost = [_first(messages, f"{namespace}/{node}", LOST) for node in (INNER_LOOP, OWN_LAW)]
+    told = [stamp for stamp in lost if stamp is not None]
+    failed = _first(messages, f"{namespace}/{OWN_LAW}", FAILED)
+    return Losses(min(told, default=None), failed)
+
+
+def _first(messages: Sequence[tuple[int, bytes]], name: str, word: str) -> int | None:
     publishers, losses = [], []
     for publisher, data in messages:
         with suppress(MessageError):
@@ -58,7 +85,7 @@ def surfaces_lost_at(messages: Sequence[tuple[int, bytes]], namespace: str) -> i
             if texts:
                 stamp = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
                 publishers.append(publisher)
-                losses.append(stamp if any(text.startswith(LOST) for text in texts) else None)
+                losses.append(stamp if any(text.startswith(word) for text in texts) else None)
     believed = obeyed(np.array(publishers, np.uint32))
     told = [loss for loss, good in zip(losses, believed, strict=True) if good and loss is not None]
     return min(told, default=None)

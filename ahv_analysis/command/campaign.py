@@ -251,19 +251,27 @@ def table(
     ] = False,
     hardware: HardwareChoice = None,
     profile: ProfileChoice = None,
+    law: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME|FILE", help="A law of your own that gets a row; any number of them."
+        ),
+    ] = None,
     workers: Workers = CORES,
     dask: Dask = None,
     out: Annotated[Path | None, typer.Option(help="Folder for campaigns and table.")] = None,
     as_json: Json = False,
 ) -> None:
     """Fly Table 5.1 of the report, beside its counts."""
-    from ahv_analysis.campaign.table import fly_table, markdown, total_runs
+    from ahv_analysis.campaign.table import fly_table, markdown, table_cases, total_runs
 
     started = time.perf_counter()
-    total = total_runs(runs)
+    laws = law or []
+    total = total_runs(runs, len(laws))
+    cases = table_cases(protected, hardware, profile, laws)
     folder = out or Path("campaigns") / "-".join(["table", *words_of(hardware, profile)])
     with (
-        executor_of(workers, dask) as pool,
+        executor_of(workers, dask, *cases) as pool,
         progress_bar("Table 5.1", total, as_json, unit="runs") as progress,
     ):
         reported = Reported(progress)
@@ -279,6 +287,7 @@ def table(
                 interrupted,
                 hardware=hardware,
                 profile=profile,
+                laws=laws,
             )
     name = "table_protected" if protected else "table"
     (equipped,) = words_of(hardware or "ideal")

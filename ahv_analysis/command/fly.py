@@ -49,6 +49,7 @@ class CaseCommand(TyperCommand):
 
 
 NAMES = re.compile("(/[A-Za-z_][A-Za-z0-9_]*)+")  # as ROS has them
+MOST_RAISED = 5  # of what a law raises, that are said
 INCOMPLETE = 3  # exit code of a flight that the bag does not hold all of
 
 
@@ -106,6 +107,7 @@ def fly(
     from ahv_analysis.flight.case import load_case
     from ahv_analysis.flight.library import fly_library
     from ahv_analysis.report.summary import missing_states, summarize
+    from ahv_control.own_law import TROUBLES
     from ahv_plant.hardware.actuator_parameters import failures_in
 
     namespace = f"/{namespace.strip('/')}"
@@ -160,6 +162,11 @@ def fly(
     summary["failures"] = failures_in(flight.parameters["plant"])
     summary |= summarize(record, ended_early, missing, flight.control)
     summary["refused"] = refused_facts(contents)
+    if flight.law is not None:
+        raised = {text: TROUBLES[text] for text in list(TROUBLES)[:MOST_RAISED]}
+        summary["law"] = {"name": flight.law.name, "raised": raised} | {
+            "compiled": not flight.law.why_plain
+        }
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     with signals_wait():
         summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
@@ -243,6 +250,8 @@ def _print_summary(summary: dict[str, Any]) -> None:
         rows.append(("outside the model", f"{what} from {since:g} s on"))
     for limit, seconds in summary["limited_s"].items():
         rows.append(("limited", f"by {limit.replace('_', ' ')} for {seconds:g} s"))
+    for words, times in summary.get("law", {}).get("raised", {}).items():
+        rows.append(("the law raised", f"{words} ({times} times)"))
     if summary["refused"]:
         rows.append(("refused", refused_words(summary["refused"])))
     show_table(f"{summary['case']} on the {summary['engine']}", rows)

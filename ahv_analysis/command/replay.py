@@ -2,6 +2,7 @@
 """The command `ahv replay`."""
 
 import time
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +12,7 @@ from rich.table import Table
 
 from ahv_analysis.command.console import (
     Json,
+    LawChoice,
     UsageError,
     check_domain,
     console,
@@ -43,6 +45,7 @@ def replay(
             metavar="FILE",
         ),
     ] = None,
+    law: LawChoice = None,
     rate: Annotated[
         float | None,
         number_option("times real time", "Pace, to watch; as fast as possible if not given"),
@@ -66,7 +69,7 @@ def replay(
     from ahv_analysis.replay.replay import replay as replay_flight
 
     recording = read_recording(bag)
-    case = _case(recording, parameters)
+    case = _case(recording, parameters, law)
     names = _names(case, node)
     steps = max((len(series.stamps) for series in recording.topics.values()), default=0)
     started = time.perf_counter()
@@ -86,18 +89,27 @@ def replay(
         raise typer.Exit(1)
 
 
-def _case(recording: "Recording", parameters: str | None) -> "Case":
-    """Parameters to replay with: of the option, or as the bag notes them."""
-    from ahv_analysis.flight.case import load_case, make_case
+def _case(recording: "Recording", parameters: str | None, law: str | None) -> "Case":
+    """Parameters to replay with: of the options, or as the bag notes them.
+
+    A law that the bag names is run only if its source is the one that flew.
+    """
+    from ahv_analysis.flight.case import load_case, make_case, why_another_law, with_law
 
     if parameters is not None:
-        return load_case(parameters, namespace=recording.namespace)
+        return load_case(parameters, namespace=recording.namespace, law=law)
     if recording.notes is None:
         raise BagError(
             f"{recording.path} does not say with which parameters it was flown: "
             "name them by --parameters"
         )
-    return make_case(recording.notes.case, recording.notes.parameters)
+    given: Mapping[str, Mapping[str, object]] = recording.notes.parameters
+    if law is not None:
+        return make_case(recording.notes.case, with_law(given, law))
+    why = why_another_law(recording.notes)
+    if why:
+        raise BagError(f"{recording.path} {why}: name the law to replay by --law")
+    return make_case(recording.notes.case, given)
 
 
 def _names(case: "Case", chosen: list[str] | None) -> list[str]:

@@ -9,11 +9,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from ahv_analysis.bag.notes import Notes
 from ahv_analysis.versions import versions
 from ahv_control.flight_control import FlightControl
 from ahv_control.guidance import Guidance
 from ahv_control.guidance_parameters import GUIDED, guidance
-from ahv_control.law_file import Law, load_law
+from ahv_control.law_file import Law, law_identity, load_law
 from ahv_control.own_law import Control, OwnLaw
 from ahv_control.parameters import (
     COMMANDED,
@@ -115,15 +116,36 @@ def read_case(
     if profile is not None:
         for node, values in load_profile(profile, namespace).items():
             given[node] |= values
-    named = given[OWN_LAW].get("law")
     if law is not None:
-        given[OWN_LAW] = {"law": _law_place(law)} | (
-            given[OWN_LAW] if named in (None, law) else {}
-        )
-        return f"{path.stem}-{Path(law).stem}", given
+        return f"{path.stem}-{Path(law).stem}", dict(with_law(given, law))
+    named = given[OWN_LAW].get("law")
     if isinstance(named, str) and named.endswith(".py"):
         given[OWN_LAW]["law"] = _law_place(str(path.parent / named))
     return path.stem, given
+
+
+def with_law(given: Mapping[str, Mapping[str, object]], law: str) -> dict[str, dict[str, object]]:
+    """Parameters `given` for each node with another law; settings of one of its name stay."""
+    own, place = dict(given.get(OWN_LAW, {})), _law_place(law)
+    if Path(str(own.get("law", ""))).stem not in ("", Path(law).stem):
+        known = {parameter.name for parameter in NODES[OWN_LAW].parameters}
+        own = {name: value for name, value in own.items() if name in known}
+    changed = {node: dict(values) for node, values in given.items()}
+    return changed | {OWN_LAW: own | {"law": place}}
+
+
+def why_another_law(notes: Notes) -> str:
+    """Why the law of a flight cannot be flown again as it was, in words; empty if it can."""
+    flown, named = notes.content.get("law"), notes.parameters.get(OWN_LAW, {}).get("law")
+    if not isinstance(flown, dict):
+        return "names a law, but not its source" if named else ""
+    try:
+        here = law_identity(str(named))
+    except ParameterError as error:
+        return f"was flown by a law that is not here ({error})"
+    if here == flown.get("source"):
+        return ""
+    return f"was flown by another source of its law ({flown.get('source')} there, {here} here)"
 
 
 def _law_place(law: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ahv_analysis.bag.record import Step
 from ahv_analysis.bag.rows import Array
-from ahv_analysis.bag.solver_status import lost_status
+from ahv_analysis.bag.solver_status import failed_status, lost_status
 from ahv_analysis.bag.writer import BagWriter
 from ahv_analysis.flight.case import Case, notes
 from ahv_analysis.flight.closed_loop import Loop, loop_of, loop_step, start_loop
@@ -16,7 +16,7 @@ from ahv_control.flight_control import Memory
 from ahv_control.law_file import compiling
 from ahv_control.learner_message import estimate_values, learner_values
 from ahv_control.newton_raphson import SolverStatus
-from ahv_control.own_law import Control, is_compiled
+from ahv_control.own_law import TROUBLES, Control, OwnLaw, is_compiled
 from ahv_msgs_py.layout import clock_bytes
 from ahv_msgs_py.topics import (
     ATTITUDE_COMMAND,
@@ -107,16 +107,16 @@ def _steps(case: Case) -> Iterator[Step]:
         loop = flown.pop()
         reason = termination_reason(loop.plant.state, truth.geometric, (first + len(flown)) * STEP)
         for number, before in enumerate(flown[:-1], first):
-            yield _step(number, before, "", equipped)
-        yield _step(first + len(flown) - 1, flown[-1], reason, equipped)
+            yield _step(number, before, "", case)
+        yield _step(first + len(flown) - 1, flown[-1], reason, case)
         if reason:
             return
-    yield _step(case.plant.steps, loop, "", equipped)
+    yield _step(case.plant.steps, loop, "", case)
 
 
-def _step(number: int, loop: Loop, ended_early: str, equipped: Rig | None) -> Step:
+def _step(number: int, loop: Loop, ended_early: str, case: Case) -> Step:
     plant = loop.plant
-    measured = None if equipped is None else plant.measured
+    measured = None if case.plant.hardware is None else plant.measured
     return Step(
         number * STEP_NS,
         plant.state,
@@ -125,6 +125,7 @@ def _step(number: int, loop: Loop, ended_early: str, equipped: Rig | None) -> St
         ended_early,
         measured,
         loop.reference,
+        isinstance(case.control, OwnLaw),
     )
 
 
@@ -176,4 +177,7 @@ def write_step(bag: BagWriter, step: Step) -> None:
     for topic, values in messages:
         bag.write(topic.name, topic.layout.encode(step.stamp, values))
     if answers.status == SolverStatus.SINGULAR:
-        bag.write(DIAGNOSTICS.name, lost_status(step.stamp))
+        bag.write(DIAGNOSTICS.name, lost_status(step.stamp, step.own_law))
+    if answers.status == SolverStatus.NO_ANSWER:
+        why = next(reversed(TROUBLES), "its answer is no number")
+        bag.write(DIAGNOSTICS.name, failed_status(step.stamp, why))

@@ -90,17 +90,36 @@ def cause_now(state: State, moving: State, status: int, geometric: bool) -> floa
     `moving` has the velocity against the air: the inlet knows no other.
     """
     left = termination(state, geometric)
-    failed = select(status == 4, 6.0, 0.0)
-    unstart = select(abs(atan2(moving.w, moving.u)) > UNSTART_ALPHA, 4.0, failed)
+    unstart = select(abs(atan2(moving.w, moving.u)) > UNSTART_ALPHA, 4.0, 0.0)
     lost = select(status == 3, 3.0, unstart)
     spent = select(left == 3, 5.0, lost)
     outside = select(left == 2, 2.0, spent)
     return select(left == 1, 1.0, outside)
 
 
+@elementwise
+def _cause_of_own(cause: float, status: int, control: OwnLaw) -> float:
+    return select((cause == 0.0) & (status == 4), 6.0, cause)
+
+
+@elementwise
+def _cause_of_loops(cause: float, status: int, control: FlightControl) -> float:
+    return cause
+
+
+def _with_law_of(kind: type) -> Callable[..., float]:
+    return _cause_of_own if issubclass(kind, OwnLaw) else _cause_of_loops
+
+
+# _with_law(cause, status, control): the same, if there is none so far that of a law of one's own
+_with_law = by_type(_with_law_of)
+
+
 @kernel
-def first_cause(states, lost, geometric):
-    """Cause at the first of `states` (n, 13) that has one, if the surfaces are lost at `lost`.
+def first_cause(states, lost, failed, geometric):
+    """Cause at the first of `states` (n, 13) that has one.
+
+    The surfaces are lost at the place `lost`, and the law has no answer at `failed`.
 
     States alone do not tell the wind: in wind, the angle of attack is that over the ground.
     """
@@ -112,6 +131,8 @@ def first_cause(states, lost, geometric):
         cause = cause_now(state, state, 3 if step == lost else 0, geometric)
         if cause != 0.0:
             return cause
+        if step == failed:
+            return 6.0
     return 0.0
 
 
@@ -132,7 +153,8 @@ def next_outcome(
     v = abs(moving.v)
     beta = atan_ratio(v, abs(moving.u))  # close to asin(v / V_t), and never more
     flying = outcome.cause == 0.0
-    cause = select(flying, cause_now(state, moving, answer.status, truth.geometric), outcome.cause)
+    now = cause_now(state, moving, answer.status, truth.geometric)
+    cause = select(flying, _with_law(now, answer.status, control), outcome.cause)
     counts = cause == 0.0
     surfaces = answer.surfaces
     least = -max(-surfaces.right_elevon, -surfaces.left_elevon, -surfaces.rudder)

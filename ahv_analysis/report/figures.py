@@ -86,6 +86,15 @@ CHAPTER_4, CHAPTER_5 = (
     for chapter in (4, 5)
 )
 
+# Figures of a law of one's own: those of chapter 3 of the flight, and of the campaign.
+OWN_LAW, CAMPAIGN_OWN_LAW = (
+    tuple(
+        Plate(f"{prefix}.{number}", *subject)
+        for number, subject in enumerate((AIR, VELOCITY, PATH, ATTITUDE, RATES, CONTROLS), 1)
+    )
+    for prefix in ("L", "LC")
+)
+
 FLOWN, MEASURED, NOMINAL, ACTUAL, ADAPTIVE = (
     "flight",
     "measured",

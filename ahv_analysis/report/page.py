@@ -15,6 +15,7 @@ from matplotlib import pyplot
 
 from ahv_analysis.bag.info import refused_words
 from ahv_analysis.bag.rows import Array
+from ahv_analysis.flight.case import OWN_LAW, Case
 from ahv_analysis.quantities import AXES, CONTROLS, TRACKED, Quantity, of_group
 from ahv_analysis.report.drawn import EXACT, drawn, drawn_time, thinned_to
 from ahv_analysis.report.figures import write_figure
@@ -22,7 +23,7 @@ from ahv_analysis.report.page_figures import flight_figures
 from ahv_analysis.report.page_flight import Flight
 from ahv_analysis.report.page_scene import scene_data, vehicle_data
 from ahv_msgs_py.graph import NODES, case_nodes
-from ahv_msgs_py.parameters import Value
+from ahv_msgs_py.parameters import Parameter, Value
 from ahv_plant.model.constants import STEP
 
 PAGE = "template"  # folder of template, styles, scripts and libraries
@@ -243,9 +244,9 @@ def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
     cases = [flight.case for flight in flights if flight.case]
     for node in case_nodes():
         flown = any(node in ("plant", *case.controllers) for case in cases)
-        for parameter in NODES[node].parameters if flown else ():
+        for parameter in (*NODES[node].parameters, *_of_laws(node, cases)) if flown else ():
             values = [
-                None if flight.case is None else flight.case.parameters[node][parameter.name]
+                None if flight.case is None else flight.case.parameters[node].get(parameter.name)
                 for flight in flights
             ]
             usual = set(values) <= {parameter.default, None}
@@ -253,6 +254,18 @@ def _settings(flights: Sequence[Flight]) -> Iterator[Setting]:
                 yield Setting(
                     node, parameter.name, parameter.unit, parameter.description, values, usual
                 )
+
+
+def _of_laws(node: str, cases: Sequence[Case]) -> list[Parameter]:
+    """Settings of laws of one's own, as they were flown: their sources may have gone."""
+    known = {parameter.name for parameter in NODES[node].parameters}
+    settings = {
+        name: value
+        for case in cases
+        for name, value in case.parameters[node].items()
+        if node == OWN_LAW and name not in known
+    }
+    return [Parameter(name, value, "setting of the law") for name, value in settings.items()]
 
 
 def _data(flights: Sequence[Flight]) -> str:

@@ -19,6 +19,7 @@ from ahv_analysis.report.figures import (
     CAMPAIGN_3,
     CAMPAIGN_4,
     CAMPAIGN_5,
+    CAMPAIGN_OWN_LAW,
     CHAPTER_3,
     CHAPTER_4,
     CHAPTER_5,
@@ -26,10 +27,12 @@ from ahv_analysis.report.figures import (
     HARDWARE,
     MEASURED,
     NOMINAL,
+    OWN_LAW,
     Plate,
     draw,
     draw_campaign,
 )
+from ahv_control.own_law import OwnLaw
 from ahv_plant.dispersion import Truth
 
 DRAWN_EVERY = 10  # steps between the points of a campaign's lines
@@ -38,7 +41,9 @@ DRAWN_EVERY = 10  # steps between the points of a campaign's lines
 def bag_figures(bag: Path) -> tuple[Sequence[Plate], Callable[[Plate], Figure]]:
     """Which figures of the report a bag is for, and how to draw one."""
     contents = read(bag)
-    case = make_case(contents.notes.case, contents.notes.parameters) if contents.notes else None
+    case = None
+    if contents.notes is not None:
+        case = make_case(contents.notes.case, contents.notes.parameters, to_fly=False)
     return flight_figures(flight_of(contents), case)
 
 
@@ -51,6 +56,8 @@ def flight_figures(
     on the actual one, with the parameters of its case. Figures of hardware show the flight alone.
     """
     own = () if flown.positions is None else HARDWARE
+    if case is not None and isinstance(case.control, OwnLaw):
+        return OWN_LAW + own, partial(draw, flights={FLOWN: flown})
     if case is None or flown.learner is None:
         return CHAPTER_3 + own, partial(_draw_one, own, flown, {FLOWN: flown})
     nominal = case._replace(control=case.control._replace(learner=None))
@@ -82,7 +89,9 @@ def campaign_figures(
     flights = [fly_trajectory(campaign.case_of(run), DRAWN_EVERY) for run in causes]
     failed = [cause != 0 for cause in causes.values()]
     control = campaign.case.control
-    if control.learner is None:
+    if isinstance(control, OwnLaw):
+        plates = CAMPAIGN_OWN_LAW
+    elif control.learner is None:
         plates = CAMPAIGN_3
     else:
         plates = CAMPAIGN_4 if control.inner.tracking.exponent == 1.0 else CAMPAIGN_5

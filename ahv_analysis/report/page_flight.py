@@ -56,6 +56,7 @@ class Flight(NamedTuple):
         reasons = [
             "" if unstart is None else f"inlet unstart: |α| beyond 5° from {unstart:g} s",
             "the surfaces lost the vehicle" if lost else "",
+            "the law gave no answer" if self.cause == Cause.LAW_FAILED else "",
             self.ended_early,
         ]
         if any(reasons):

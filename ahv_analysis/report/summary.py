@@ -87,11 +87,13 @@ def outside_the_model(record: FlightRecord) -> dict[str, float]:
 
 def failure(record: FlightRecord, ended_early: str) -> Cause:
     """Return the first cause of failure of a flight, by the rule of the campaigns' outcome."""
-    lost_at = record.surfaces_lost_at
-    lost = len(record.stamps) if lost_at is None else int(np.searchsorted(record.stamps, lost_at))
+    lost, failed = (
+        len(record.stamps) if stamp is None else int(np.searchsorted(record.stamps, stamp))
+        for stamp in (record.surfaces_lost_at, record.law_failed_at)
+    )
     for start in range(0, len(record.stamps), BLOCK):
         states = np.ascontiguousarray(record.states[start : start + BLOCK])
-        cause = Cause(int(first_cause(states, lost - start, record.geometric)))
+        cause = Cause(int(first_cause(states, lost - start, failed - start, record.geometric)))
         if cause != Cause.SUCCESS:
             return cause
     # the state that ended a flight is not in its record
