@@ -69,7 +69,7 @@ def scene_channels(flight: Flight) -> dict[str, Array]:
     if record.references is not None:
         channels["reference"] = record.references[part, 0]
     elif settings is not None:
-        channels["reference"] = np.full(count, settings.outer.altitude)
+        channels["reference"] = np.full(count, settings.altitude)
     with np.errstate(over="ignore"):
         return {name: np.nan_to_num(values.astype("<f4")) for name, values in channels.items()}
 
