@@ -1,8 +1,8 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The winged cone as viewers draw it: triangles of the body, and surfaces that turn on hinges.
 
-Span and wing area are those of Table 2.1 of the report; the rest follows the drawing of the vehicle
-closely enough to look at. The model of the flight uses none of it.
+Span and wing area are those of Table 2.1 of the report; the rest follows the drawing of the
+vehicle closely enough to look at. The model of the flight uses none of it.
 """
 
 from itertools import pairwise
