@@ -17,6 +17,7 @@ from ahv_analysis.campaign.campaign import Campaign, fly_again, fly_runs
 from ahv_analysis.flight.case import load_case, profile_names
 from ahv_analysis.flight.library import fly
 from ahv_analysis.flight.one_process import fly_graph
+from ahv_analysis.quantities import BY_NAME
 from ahv_analysis.replay.inputs import read_recording
 from ahv_analysis.replay.replay import replay
 from ahv_analysis.report.metrics import measure
@@ -268,22 +269,57 @@ def test_a_ramp_is_followed_with_the_lag_that_the_loops_predict(tmp_path):
     assert np.max(np.abs(h - wanted)) < 10.0, "none of it where the rate is sent as well"
 
 
-@pytest.mark.parametrize("hardware", [None, "typical"])
-@pytest.mark.parametrize("profile", profile_names())
+def same_bits(case, bag, domain):
+    """Fly a case on the graph and in the library, and replay it: all of it to the same bits."""
+    flown = record_of(fly(case), False)
+    fly_graph(case, bag, domain=domain)
+    graph = read_bag(bag)
+    for name in ("states", "attitude_commands", "surfaces", "throttle", "references"):
+        assert np.array_equal(getattr(graph, name), getattr(flown, name)), name
+    again = replay(read_recording(bag), case, case.controllers)
+    assert "guidance" in {entry.node for entry in again.comparisons}
+    steps = case.plant.steps + 1
+    assert all(entry.compared == steps and not entry.differences for entry in again.comparisons)
+    for name, index in (("h", 0), ("u", 1)):
+        drawn = BY_NAME[name].drawn_reference(graph, None)  # the dashed line
+        assert np.array_equal(drawn, flown.references[:, index])
+
+
+# the first changes come at 10 s
+BEGUN = [*((one, "typical") for one in profile_names()), ("altitude_step", None)]
+BEGUN += [("waypoints", None)]
+
+
+@pytest.mark.parametrize("profile, hardware", BEGUN)
 def test_a_profile_flies_to_the_same_bits_as_nodes_in_lanes_and_again(
     tmp_path, domain, profile, hardware
 ):
-    case = load_case(
-        "neuro_adaptive_sc_gdi_protected", {"duration": 12.0}, hardware=hardware, profile=profile
-    )
-    flown = record_of(fly(case), False)
-    fly_graph(case, tmp_path / "bag", domain=domain)
-    graph = read_bag(tmp_path / "bag")
-    for name in ("states", "attitude_commands", "surfaces", "throttle", "references"):
-        assert np.array_equal(getattr(graph, name), getattr(flown, name)), name
-    again = replay(read_recording(tmp_path / "bag"), case, case.controllers)
-    assert "guidance" in {entry.node for entry in again.comparisons}
-    assert all(entry.compared == 1201 and not entry.differences for entry in again.comparisons)
+    case = "neuro_adaptive_sc_gdi_protected"
+    loaded = load_case(case, {"duration": 12.0}, hardware=hardware, profile=profile)
+    same_bits(loaded, tmp_path / "bag", domain)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hardware", [None, "typical"])
+@pytest.mark.parametrize("profile", profile_names())
+def test_a_whole_profile_flies_to_the_same_bits_and_keeps_its_inlet(
+    tmp_path, domain, profile, hardware
+):
+    case = load_case("neuro_adaptive_sc_gdi_protected", hardware=hardware, profile=profile)
+    same_bits(case, tmp_path / "bag", domain)
+    assert read_bag(tmp_path / "bag").inlet_started
+
+
+@pytest.mark.parametrize("keeps", ["climb_mach", "climb_pressure"])
+def test_a_climb_keeps_what_its_profile_names(keeps):
+    """From where it begins: within a hundredth of the Mach number, a fortieth of the pressure."""
+    case = load_case("nominal_di", {"duration": 560.0}, profile=keeps)
+    record = record_of(fly(case), False)
+    under_way = slice(6000, None)
+    kept = record.air.mach if keeps == "climb_mach" else record.air.dynamic_pressure
+    kept = kept[under_way] / np.mean(kept[under_way])
+    assert np.max(np.abs(kept - 1.0)) < (0.01 if keeps == "climb_mach" else 0.025)
+    assert record.column("h")[-1] == pytest.approx(27000.0, abs=100.0)
 
 
 def test_a_lane_follows_its_own_waypoints_to_the_bits_of_the_run_alone():

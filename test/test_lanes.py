@@ -130,7 +130,7 @@ case = load_case("neuro_adaptive_sc_gdi")
 states = np.repeat(np.array(case.plant.initial)[:, None], LANES, axis=1)
 result = np.empty((len(Outcome._fields), LANES))
 truth, control = case.plant.truth, case.control
-batch_outcomes(states, np.ones((9, LANES)), LIKE, truth, control, 1, result)
+batch_outcomes(states, np.ones((9, LANES)), LIKE, truth, control, 1, None, result)
 print(*batch_outcomes.inspect_asm().values())
 """
 

@@ -10,7 +10,7 @@ from ahv_analysis.bag.rows import Array
 from ahv_analysis.flight.case import Case
 from ahv_analysis.flight.closed_loop import loop_of, loop_step, start_loop
 from ahv_analysis.flight.library import fly
-from ahv_analysis.flight.outcome import START, Outcome, next_outcome, outcome_after
+from ahv_analysis.flight.outcome import START, Corridor, Outcome, next_outcome, outcome_after
 from ahv_control.own_law import Control, is_compiled
 from ahv_plant.dispersion import Dispersion, Truth
 from ahv_plant.hardware.delay import ROWS
@@ -29,22 +29,22 @@ LIKE = (State(*[0.0] * len(State._fields)), Dispersion())
 
 
 @kernel
-def run_outcome(state, truth, control, steps):
+def run_outcome(state, truth, control, steps, corridor):
     """Outcome of a flight; the numbers may be lanes."""
     one = state.u
     loop, outcome = widen(start_loop(state, truth, control, None, None), one), widen(START, one)
     for number in range(steps):
-        outcome = next_outcome(outcome, loop, number, control, truth)
+        outcome = next_outcome(outcome, loop, number, control, truth, corridor)
         loop = widen(loop_step(loop, number, truth, control, None, None), one)
-    return next_outcome(outcome, loop, steps, control, truth)
+    return next_outcome(outcome, loop, steps, control, truth, corridor)
 
 
 @kernel
-def batch_outcomes(states, dispersions, like, truth, control, steps, result):
+def batch_outcomes(states, dispersions, like, truth, control, steps, corridor, result):
     """Fly a batch of runs: states (13, LANES) and dispersions (9, LANES) to result."""
     dispersion = load(like[1], dispersions)
     truth = Truth(truth.geometric, dispersion, truth.disturbance, truth.further, truth.wind)
-    store(result, run_outcome(load(like[0], states), truth, control, steps))
+    store(result, run_outcome(load(like[0], states), truth, control, steps, corridor))
 
 
 @kernel
@@ -55,11 +55,11 @@ def begin(state, truth, control, draws, rig):
 
 
 @kernel
-def go_on(loop, outcome, first, block, like, truth, control, rig):
+def go_on(loop, outcome, first, block, like, truth, control, rig, corridor):
     """Loop and outcome after as many steps as there are rows of draws in a block."""
     one = loop.plant.state.u
     for row in range(len(block)):
-        outcome = next_outcome(outcome, loop, first + row, control, truth)
+        outcome = next_outcome(outcome, loop, first + row, control, truth, corridor)
         draws = load(like, block[row])
         loop = widen(loop_step(loop, first + row, truth, control, draws, rig), one)
     return loop, outcome
@@ -83,20 +83,21 @@ def begin_batch(states, starts, like, truth, control, block, rig, kept):
 
 
 @kernel
-def go_on_batch(kept, like, dispersions, first, block, truth, control, rig):
+def go_on_batch(kept, like, dispersions, first, block, truth, control, rig, corridor):
     """Fly a batch for a block of draws, from what was `kept` to what is."""
     truth = Truth(
         truth.geometric, load(like[0], dispersions), truth.disturbance, truth.further, truth.wind
     )
     loop, outcome = load(like[2], kept)
-    store(kept, go_on(loop, outcome, first, block, like[1], truth, control, rig))
+    loop, outcome = go_on(loop, outcome, first, block, like[1], truth, control, rig, corridor)
+    store(kept, (loop, outcome))
 
 
 @kernel
-def end_batch(kept, like, steps, control, truth, result):
+def end_batch(kept, like, steps, control, truth, corridor, result):
     """Outcomes of a batch at the end of its flight."""
     loop, outcome = load(like, kept)
-    store(result, next_outcome(outcome, loop, steps, control, truth))
+    store(result, next_outcome(outcome, loop, steps, control, truth, corridor))
 
 
 @kernel
@@ -153,9 +154,14 @@ def fly_trajectory(case: Case, every: int) -> FlightRecord:
 
 
 def fly_batch(
-    states: Array, dispersions: Array, truth: Truth, control: Control, steps: int
+    states: Array,
+    dispersions: Array,
+    truth: Truth,
+    control: Control,
+    steps: int,
+    corridor: Corridor | None = None,
 ) -> Array:
-    """Outcomes (N, 14) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9).
+    """Outcomes (N, 23) of N runs from `states` (N, 13) on vehicles with `dispersions` (N, 9).
 
     All else that is true is that of `truth`.
     """
@@ -169,6 +175,7 @@ def fly_batch(
             truth,
             control,
             steps,
+            corridor,
             outcomes,
         )
         rows.append(outcomes.T.copy())
@@ -184,8 +191,9 @@ def fly_batch_on_hardware(
     control: Control,
     hardware: Hardware,
     steps: int,
+    corridor: Corridor | None = None,
 ) -> Array:
-    """Outcomes (N, 14) as `fly_batch`, on hardware, with the draws of every run.
+    """Outcomes (N, 23) as `fly_batch`, on hardware, with the draws of every run.
 
     The actuators rest at `starts` (N, 4), in the order of `Controls`, until they are told.
     """
@@ -211,8 +219,8 @@ def fly_batch_on_hardware(
         vehicles = lanes_of(dispersions, first)
         for flown in range(0, steps, DRAWN):
             draws = drawn(min(DRAWN, steps - flown))
-            go_on_batch(kept, like, vehicles, flown, draws, truth, control, equipped)
-        end_batch(kept, sample, steps, control, truth, outcomes)
+            go_on_batch(kept, like, vehicles, flown, draws, truth, control, equipped, corridor)
+        end_batch(kept, sample, steps, control, truth, corridor, outcomes)
         rows.append(outcomes.T.copy())
     return np.concatenate(rows)[: len(states)]
 
@@ -238,22 +246,24 @@ def find_trims(
     return np.concatenate(rows)[: len(dispersions)]
 
 
-def fly_alone(case: Case) -> Outcome:
+def fly_alone(case: Case, corridor: Corridor | None = None) -> Outcome:
     """Outcome of one run by scalar code: the same bits as in a lane."""
     state, steps, truth, hardware, noise = case.plant
     if not is_compiled(case.control):
-        return _fly_plain(case)
+        return _fly_plain(case, corridor)
     if hardware is None:
-        return Outcome(*run_outcome(state, truth, case.control, steps))
+        return Outcome(*run_outcome(state, truth, case.control, steps, corridor))
     equipped, stream = rig(hardware), noise_stream(hardware, truth.wind, *noise)
     loop, outcome = begin(state, truth, case.control, draws_of(stream.block(1)[0]), equipped)
     for flown in range(0, steps, DRAWN):
         block = stream.block(min(DRAWN, steps - flown))
-        loop, outcome = go_on(loop, outcome, flown, block, NO_DRAWS, truth, case.control, equipped)
-    return Outcome(*next_outcome(outcome, loop, steps, case.control, truth))
+        loop, outcome = go_on(
+            loop, outcome, flown, block, NO_DRAWS, truth, case.control, equipped, corridor
+        )
+    return Outcome(*next_outcome(outcome, loop, steps, case.control, truth, corridor))
 
 
-def _fly_plain(case: Case) -> Outcome:
+def _fly_plain(case: Case, corridor: Corridor | None) -> Outcome:
     """Outcome of one run of a law in plain Python; nothing changes once it has failed."""
     state, steps, truth, hardware, noise = case.plant
     control, equipped = case.control, rig(hardware)
@@ -261,11 +271,11 @@ def _fly_plain(case: Case) -> Outcome:
     first, later = loop_of(control)
     loop, outcome = first(state, truth, control, next(draws), equipped), START
     for number in range(steps):
-        outcome = outcome_after(outcome, loop, number, control, truth)
+        outcome = outcome_after(outcome, loop, number, control, truth, corridor)
         if outcome.cause != 0.0:
             return outcome
         loop = later(loop, number, truth, control, next(draws), equipped)
-    return outcome_after(outcome, loop, steps, control, truth)
+    return outcome_after(outcome, loop, steps, control, truth, corridor)
 
 
 def lanes_of(rows: Array, first: int) -> Array:

@@ -45,7 +45,7 @@ from ahv_analysis.flight.case import (
     dispersion_parameters,
     make_case,
 )
-from ahv_analysis.flight.outcome import Outcome
+from ahv_analysis.flight.outcome import Corridor, Outcome
 from ahv_analysis.versions import what_computes
 from ahv_control.law_file import compiling, law_identity
 from ahv_control.own_law import is_compiled
@@ -84,6 +84,7 @@ class Campaign:
     seed: int
     random_starts: bool = False
     draws: dict[str, Any] | None = None  # what else is drawn, as a file of `load_draws` holds it
+    corridor: Corridor | None = None  # which a run must keep to as well
 
     def describe(self) -> dict[str, Any]:
         """All that decides a run: what computes it too, but not the number of runs."""
@@ -96,6 +97,7 @@ class Campaign:
             "seed": self.seed,
             "random_starts": self.random_starts,
             "draws": self.draws,
+            **({} if self.corridor is None else {"corridor": self.corridor._asdict()}),
             "parameters": self.case.parameters,
         }
 
@@ -151,12 +153,20 @@ def fly_runs(campaign: Campaign, first: int, count: int) -> Columns:
     control, (initial, steps, truth, hardware, _) = case.control, case.plant
     starts = None
     if hardware is None:
-        outcomes = fly_batch(states, dispersions, truth, control, steps)
+        outcomes = fly_batch(states, dispersions, truth, control, steps, campaign.corridor)
     else:
         noise = [noise_stream(hardware, truth.wind, campaign.seed, run) for run in runs]
         starts = np.array([campaign.controls(run) for run in runs])
         outcomes = fly_batch_on_hardware(
-            states, dispersions, starts, noise, truth, control, hardware, steps
+            states,
+            dispersions,
+            starts,
+            noise,
+            truth,
+            control,
+            hardware,
+            steps,
+            campaign.corridor,
         )
     trims = find_trims(
         dispersions,
@@ -173,7 +183,7 @@ def fly_again(campaign: Campaign, run: int) -> Columns:
     """Fly one run by scalar code: the columns of its row, with the same bits."""
     case = campaign.case_of(run)
     control, initial, truth = case.control, case.plant.initial, case.plant.truth
-    outcome = fly_alone(case)
+    outcome = fly_alone(case, campaign.corridor)
     altitude, speed = control.altitude, control.speed
     trim = level_trim(altitude, speed, initial.mass, in_calm(truth))
     draws = None if case.plant.hardware is None else NO_DRAWS
@@ -224,6 +234,7 @@ def _columns(
     """Columns of the campaign's file."""
     outcome, trim = Outcome(*outcomes.T), LevelTrim(*trims.T)
     table: Columns = {"run": runs}
+    counted = np.maximum(outcome.steps, 1)
     table |= {name: dispersions[:, i] for i, name in enumerate(Dispersion._fields)}
     table |= {
         f"initial_{name}": states[:, State._fields.index(name)] for name in ("u", *"PQR", "h")
@@ -244,6 +255,18 @@ def _columns(
         "max_observer_error_dps": outcome.max_observer_error * DEGREES,
         "final_altitude_m": outcome.final_altitude,
         "final_speed_mps": outcome.final_speed,
+        "rms_altitude_error_m": np.sqrt(outcome.squared_altitude_error / counted),
+        "final_altitude_error_m": outcome.final_altitude_error,
+        "rms_speed_error_mps": np.sqrt(outcome.squared_speed_error / counted),
+        "max_speed_error_mps": outcome.max_speed_error,
+        "max_heading_error_deg": outcome.max_heading_error * DEGREES,
+        "fuel_kg": np.where(
+            outcome.final_mass > 0.0,
+            states[:, State._fields.index("mass")] - outcome.final_mass,
+            0.0,
+        ),
+        "least_mach": outcome.least_mach,
+        "outside_corridor_s": outcome.outside * STEP,
         "nose_down_alpha_deg": bounds[:, 0] * DEGREES,
         "trim_exists": trim.exists == 1.0,
         "trim_alpha_deg": trim.alpha * DEGREES,
@@ -394,6 +417,7 @@ def _campaign_of(described: dict[str, Any], runs: int) -> Campaign:
         described["seed"],
         described["random_starts"],
         described.get("draws"),  # which older campaigns do not speak of
+        Corridor(**described["corridor"]) if described.get("corridor") else None,
     )
 
 

@@ -10,12 +10,18 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+from ahv_analysis.bag.rows import Array
 from ahv_analysis.campaign.campaign import Campaign
 from ahv_analysis.campaign.store import Columns, level_folder, read_parts
 from ahv_analysis.flight.outcome import Cause
+from ahv_plant.model.aerodynamics import MACH_MINIMUM
 from ahv_plant.model.constants import DEGREES, UNSTART_ALPHA
 
-COUNTED = ("run", "cause", "time_s", "nose_down_alpha_deg", "trim_exists", "trim_alpha_deg")
+COUNTED = (
+    *("run", "cause", "time_s", "nose_down_alpha_deg", "trim_exists", "trim_alpha_deg"),
+    *("least_mach", "rms_altitude_error_m", "final_altitude_error_m", "rms_speed_error_mps"),
+    *("fuel_kg",),
+)
 
 
 @dataclass
@@ -28,6 +34,8 @@ class Counts:
     beyond_saving: int = 0  # pass 5 deg though they go nose down as fast as they can
     failed_beyond_saving: int = 0
     flown_s: float = 0.0
+    slow: int = 0  # successes that were below Mach 4, where the model does not hold
+    tracked: list[Array] = field(default_factory=list)  # (n, 4) of the successes
 
 
 def count_runs(parts: Iterable[Columns], runs: int) -> Counts:
@@ -46,6 +54,9 @@ def count_runs(parts: Iterable[Columns], runs: int) -> Counts:
         beyond = part["nose_down_alpha_deg"][asked] > UNSTART_ALPHA * DEGREES
         counts.beyond_saving += int(np.sum(beyond))
         counts.failed_beyond_saving += int(np.sum(beyond & (cause != Cause.SUCCESS)))
+        kept = cause == Cause.SUCCESS
+        counts.slow += int(np.sum(kept & (part["least_mach"][asked] < MACH_MINIMUM)))
+        counts.tracked.append(np.array([part[name][asked][kept] for name in COUNTED[-4:]]).T)
         counts.flown_s += float(np.sum(part["time_s"][asked]))
     return counts
 
@@ -54,6 +65,20 @@ def exact_interval(successes: int, runs: int) -> tuple[float, float]:
     """Clopper-Pearson 95 % interval of a success rate."""
     interval = binomtest(successes, runs).proportion_ci(method="exact")
     return float(interval.low), float(interval.high)
+
+
+def _tracking(rows: Array) -> dict[str, float]:
+    """How the successes (n, 4) followed their reference: medians, and what was largest."""
+    altitude, final, speed, fuel = rows.T
+    return {
+        "median_rms_altitude_error_m": float(np.median(altitude)),
+        "largest_rms_altitude_error_m": float(np.max(altitude)),
+        "median_final_altitude_error_m": float(np.median(np.abs(final))),
+        "largest_final_altitude_error_m": float(np.max(np.abs(final))),
+        "median_rms_speed_error_mps": float(np.median(speed)),
+        "largest_rms_speed_error_mps": float(np.max(speed)),
+        "median_fuel_kg": float(np.median(fuel)),
+    }
 
 
 def summarize_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
@@ -78,5 +103,7 @@ def summarize_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
         "failures_without_such_trim": counts.failed_without_trim,
         "beyond_saving": counts.beyond_saving,
         "failures_beyond_saving": counts.failed_beyond_saving,
+        "successes_below_mach_4": counts.slow,
+        "tracking": _tracking(np.concatenate(counts.tracked)) if successes else None,
         "flown_s": counts.flown_s,
     }

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,6 +25,7 @@ from ahv_analysis.command.console import (
     UsageError,
     check_domain,
     integer_option,
+    number_option,
     print_json,
     progress_bar,
     show_table,
@@ -75,6 +77,7 @@ def executor_of(workers: int, dask: str | None, *cases: "Case") -> Iterator[Exec
 Workers = Annotated[int, integer_option("Threads, by default one a core.", 1)]
 Dask = Annotated[str | None, typer.Option(help="Address of a dask scheduler to fly on.")]
 Seed = Annotated[int, integer_option("Seed of the draws.")]
+WIDE = 1e9  # [m, m/s] of a corridor that bounds one of both
 CORES = os.cpu_count() or 1
 
 
@@ -102,6 +105,16 @@ def fly(
         Path | None,
         typer.Option(metavar="FILE", help="What is drawn besides: distributions in a YAML file."),
     ] = None,
+    corridor_altitude: Annotated[
+        float | None,
+        number_option("m", "A run farther from the altitude to follow than this is lost"),
+    ] = None,
+    corridor_speed: Annotated[
+        float | None, number_option("m/s", "A run farther from the speed to follow is lost")
+    ] = None,
+    corridor_time: Annotated[
+        float | None, number_option("s", "Time it may be outside without a break, by default 0")
+    ] = None,
     workers: Workers = CORES,
     dask: Dask = None,
     out: Annotated[
@@ -124,12 +137,13 @@ def fly(
     name = controller + ("_protected" if protected else "")
     case = load_case(name, hardware=hardware, profile=profile, law=law)
     drawn = None if draws is None else load_draws(draws)
+    corridor = _corridor(corridor_altitude, corridor_speed, corridor_time)
     words = [case.name, *words_of(hardware, profile, None if draws is None else draws.stem)]
     folder = out or Path("campaigns") / "-".join(words)
     summaries = []
     with executor_of(workers, dask, case) as pool:
         for one in levels:
-            campaign = Campaign(case, one, runs, seed, random_starts, drawn)
+            campaign = Campaign(case, one, runs, seed, random_starts, drawn, corridor)
             with progress_bar(f"{case.name} at {one:g}", runs, as_json, unit="runs") as progress:
                 reported = Reported(progress)
                 started = time.perf_counter()
@@ -146,6 +160,21 @@ def fly(
         return
     for summary in summaries:
         _show(summary)
+
+
+def _corridor(altitude: float | None, speed: float | None, longest: float | None) -> Any:
+    """Corridor of the options; None without limits, UsageError for what is no corridor."""
+    from ahv_analysis.flight.outcome import Corridor
+
+    given = {"altitude": altitude, "speed": speed, "time": longest}
+    for name, value in given.items():
+        if value is not None and not (0.0 < value < inf or (name, value) == ("time", 0.0)):
+            raise UsageError(f"--corridor-{name} is {value:g}, but must be more than 0")
+    if altitude is None and speed is None:
+        if longest is not None:
+            raise UsageError("--corridor-time needs --corridor-altitude or --corridor-speed")
+        return None
+    return Corridor(altitude or WIDE, speed or WIDE, longest or 0.0)
 
 
 def kept_words(reported: Reported, runs: int) -> str:
@@ -172,10 +201,36 @@ def _show(summary: dict[str, Any]) -> None:
             f"{summary['beyond_saving']} vehicles pass 5 deg at full nose-down from the start on;"
             f" {summary['failures_beyond_saving']} of the failed do",
         ),
+        *_tracked(summary),
         ("pace", f"{summary['trial_steps_per_second']:.3g} steps/s, {summary['wall_s']:.1f} s"),
         ("kept in", summary["out"]),
     ]
     show_table(f"{summary['controller']} at {summary['level']:g}", rows)
+
+
+def _tracked(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """How the successes followed their reference."""
+    found = summary["tracking"]
+    if found is None:
+        return []
+    rows = [
+        (
+            "of the successes",
+            f"altitude error {found['median_rms_altitude_error_m']:.0f} m RMS in the median, "
+            f"{found['largest_rms_altitude_error_m']:.0f} m at most; at the end "
+            f"{found['median_final_altitude_error_m']:.0f} and "
+            f"{found['largest_final_altitude_error_m']:.0f} m",
+        ),
+        (
+            "",
+            f"speed error {found['median_rms_speed_error_mps']:.1f} m/s RMS in the median; "
+            f"{found['median_fuel_kg'] / 1e3:.1f} t of fuel",
+        ),
+    ]
+    if summary["successes_below_mach_4"]:
+        slow = f"{summary['successes_below_mach_4']} of them, where the model does not hold"
+        rows.append(("below Mach 4", slow))
+    return rows
 
 
 @monte_carlo.command()

@@ -6,19 +6,24 @@ Element-wise, so that a run counts the same alone and in a lane.
 
 from collections.abc import Callable
 from enum import IntEnum
+from functools import partial
+from math import sqrt
 from typing import NamedTuple
 
 from ahv_analysis.flight.closed_loop import Loop
 from ahv_control.disturbance_learner import LearnerState
 from ahv_control.flight_control import FlightControl, Memory
 from ahv_control.own_law import Control, OwnLaw, followed, is_compiled
+from ahv_control.reference import Reference
 from ahv_plant.dispersion import Truth
 from ahv_plant.hardware.wind import through_air
+from ahv_plant.model.atmosphere import atmosphere
 from ahv_plant.model.constants import STEP, UNSTART_ALPHA
 from ahv_plant.model.vectors import State
 from ahv_plant.numerics.by_type import by_type
 from ahv_plant.numerics.elementary import atan2, atan_ratio
 from ahv_plant.numerics.elementwise import elementwise, kernel, select
+from ahv_plant.numerics.optional import optional
 from ahv_plant.termination import termination
 
 
@@ -32,6 +37,15 @@ class Cause(IntEnum):
     INLET_UNSTART = 4  # |alpha| > 5 deg
     LEFT_THE_MASS_MODEL = 5  # the fuel is burnt
     LAW_FAILED = 6  # it raised, or answered what is no number
+    LEFT_THE_CORRIDOR = 7  # for longer than it may, where a campaign has one
+
+
+class Corridor(NamedTuple):
+    """What a run must keep to beside |alpha| <= 5 deg: how far it may be from its reference."""
+
+    altitude: float  # [m]
+    speed: float  # [m/s]
+    longest: float  # [s] that it may be outside without a break: steps of h* take minutes
 
 
 class Outcome(NamedTuple):
@@ -51,9 +65,21 @@ class Outcome(NamedTuple):
     max_observer_error: float  # [rad/s] largest |X - X_a|; zero without a learner
     final_altitude: float  # [m] last before the failure
     final_speed: float  # [m/s]
+    squared_altitude_error: float  # [m^2] sum over the steps
+    squared_speed_error: float  # [m^2/s^2] sum over the steps
+    max_speed_error: float  # [m/s]
+    max_heading_error: float  # [rad]
+    final_altitude_error: float  # [m] altitude less h*
+    final_mass: float  # [kg]
+    least_mach: float  # [-]
+    outside: float  # steps outside the corridor; zero without one
+    outside_now: float  # steps without a break up to now
 
 
-START = Outcome(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.0, 0.0)
+START = Outcome(
+    *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0, -9.0, 9.0, -9.0, 0.0, 0.0, 0.0, 0.0),
+    *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 99.0, 0.0, 0.0),
+)
 
 
 @elementwise
@@ -136,26 +162,61 @@ def first_cause(states, lost, failed, geometric):
     return 0.0
 
 
+def _never(state: State, reference: Reference) -> float:
+    return 0.0
+
+
+@partial(optional, otherwise=_never)
+def outside_now(state: State, reference: Reference, corridor: Corridor) -> float:
+    """1 where a state is outside its corridor [-], else 0; 0 without one."""
+    high = abs(state.h - reference.altitude) > corridor.altitude
+    fast = abs(state.u - reference.speed) > corridor.speed
+    return select(high | fast, 1.0, 0.0)
+
+
+def _any_time(steps: float) -> bool:
+    return False
+
+
+@partial(optional, otherwise=_any_time)
+def _too_long(steps: float, corridor: Corridor) -> bool:
+    return steps * STEP > corridor.longest
+
+
 @elementwise
 def next_outcome(
-    outcome: Outcome, loop: Loop, number: int, control: Control, truth: Truth
+    outcome: Outcome,
+    loop: Loop,
+    number: int,
+    control: Control,
+    truth: Truth,
+    corridor: Corridor | None,
 ) -> Outcome:
     """Outcome after one more state and its answer; once a run has failed nothing changes.
 
     `number` counts the steps flown before. Angles are those against the air; the altitude error
-    [m] is that to the reference of `control`.
+    [m] is that to the reference of `control`. Without a `corridor` no error of it is a failure.
     """
     state, answer = loop.plant.state, loop.commands
-    wanted = followed(loop.reference, control).altitude
+    wanted = followed(loop.reference, control)
     observed = observer_error(loop.plant.measured.state, loop.memory, control)
     moving = through_air(state, number * STEP, loop.plant.turbulence, truth.wind)
     alpha = abs(atan2(moving.w, moving.u))
     v = abs(moving.v)
     beta = atan_ratio(v, abs(moving.u))  # close to asin(v / V_t), and never more
     flying = outcome.cause == 0.0
-    now = cause_now(state, moving, answer.status, truth.geometric)
-    cause = select(flying, _with_law(now, answer.status, control), outcome.cause)
+    outside = outside_now(state, wanted, corridor)
+    so_long = (outcome.outside_now + outside) * outside
+    left = select(_too_long(so_long, corridor), 7.0, 0.0)
+    found = _with_law(
+        cause_now(state, moving, answer.status, truth.geometric), answer.status, control
+    )
+    cause = select(flying, select(found == 0.0, left, found), outcome.cause)
     counts = cause == 0.0
+    high, fast = state.h - wanted.altitude, state.u - wanted.speed
+    turned = abs(state.psi - wanted.psi)
+    against_air = moving.u * moving.u + moving.v * moving.v + moving.w * moving.w
+    mach = sqrt(against_air) / atmosphere(state.h, truth.geometric).sound_speed
     surfaces = answer.surfaces
     least = -max(-surfaces.right_elevon, -surfaces.left_elevon, -surfaces.rudder)
     most = max(surfaces.right_elevon, surfaces.left_elevon, surfaces.rudder)
@@ -174,20 +235,35 @@ def next_outcome(
         select(counts, max(outcome.max_throttle, answer.throttle), outcome.max_throttle),
         select(
             counts,
-            max(outcome.max_altitude_error, abs(state.h - wanted)),
+            max(outcome.max_altitude_error, abs(high)),
             outcome.max_altitude_error,
         ),
         select(counts, max(outcome.max_observer_error, observed), outcome.max_observer_error),
         select(counts, state.h, outcome.final_altitude),
         select(counts, state.u, outcome.final_speed),
+        outcome.squared_altitude_error + select(counts, high * high, 0.0),
+        outcome.squared_speed_error + select(counts, fast * fast, 0.0),
+        select(counts, max(outcome.max_speed_error, abs(fast)), outcome.max_speed_error),
+        select(counts, max(outcome.max_heading_error, turned), outcome.max_heading_error),
+        select(counts, high, outcome.final_altitude_error),
+        select(counts, state.mass, outcome.final_mass),
+        select(counts, -max(-outcome.least_mach, -mach), outcome.least_mach),
+        # the step that is too much still counts, so that the time outside tells of it
+        outcome.outside + select(flying, outside, 0.0),
+        select(flying, so_long, outcome.outside_now),
     )
 
 
 def outcome_after(
-    outcome: Outcome, loop: Loop, number: int, control: Control, truth: Truth
+    outcome: Outcome,
+    loop: Loop,
+    number: int,
+    control: Control,
+    truth: Truth,
+    corridor: Corridor | None,
 ) -> Outcome:
     """`next_outcome` of any law: one in plain Python may remember what is not compiled."""
     if not is_compiled(control) and isinstance(control, OwnLaw):
         told = OwnLaw(None, control.altitude, control.speed, control.guidance)
-        return next_outcome(outcome, loop._replace(memory=None), number, told, truth)
-    return next_outcome(outcome, loop, number, control, truth)
+        return next_outcome(outcome, loop._replace(memory=None), number, told, truth, corridor)
+    return next_outcome(outcome, loop, number, control, truth, corridor)
