@@ -312,13 +312,13 @@ def test_a_whole_profile_flies_to_the_same_bits_and_keeps_its_inlet(
 
 @pytest.mark.parametrize("keeps", ["climb_mach", "climb_pressure"])
 def test_a_climb_keeps_what_its_profile_names(keeps):
-    """From where it begins: within a hundredth of the Mach number, a fortieth of the pressure."""
+    """From where it begins: within a fiftieth of the Mach number, a fortieth of the pressure."""
     case = load_case("nominal_di", {"duration": 560.0}, profile=keeps)
     record = record_of(fly(case), False)
     under_way = slice(6000, None)
     kept = record.air.mach if keeps == "climb_mach" else record.air.dynamic_pressure
     kept = kept[under_way] / np.mean(kept[under_way])
-    assert np.max(np.abs(kept - 1.0)) < (0.01 if keeps == "climb_mach" else 0.025)
+    assert np.max(np.abs(kept - 1.0)) < (0.02 if keeps == "climb_mach" else 0.025)
     assert record.column("h")[-1] == pytest.approx(27000.0, abs=100.0)
 
 
