@@ -96,7 +96,7 @@ class GuidanceNode(BaseNode):
         if number % REACH_PERIOD == 0:
             why = why_not_followed(reference, state.mass, self._plan.guidance.schedule.geometric)
             if why:
-                self.fault(stamp, Fault.REFERENCE_OUT_OF_REACH, why)
+                self.fault(stamp, Fault.OUT_OF_REACH, why)
 
     # Selections
 

@@ -29,7 +29,7 @@ def test_nominal_case_is_section_3_5_2():
     assert (start.P, start.Q, start.R) == (3 * RADIANS, 2 * RADIANS, -3 * RADIANS)
     assert (start.phi, start.theta, start.psi) == (0.0, 2.94 * RADIANS, 0.0)
     assert case.plant.steps == 15000
-    assert case.control.outer == (24000.0, 0.01, math.pi, math.pi / 2)
+    assert case.control.outer == (24000.0, 0.01, math.pi, math.pi / 2, None)
     assert case.control.intermediate == (0.2, 0.2, 0.2)
     assert case.control.inner.tracking.gain == (2.0, 2.0, 2.0)
     assert case.control.inner.tracking.exponent == 1.0

@@ -90,8 +90,8 @@ def test_what_a_newcomer_types_first():
     assert bare.stdout == told("-h").stdout == told("--help").stdout
     assert "..." not in bare.stdout.replace("[ARGS]...", "")  # no text is cut
     names = [line.split()[0] for line in bare.stdout.partition("Commands:\n")[2].splitlines()]
-    in_order = "fly figures report bag replay monte-carlo table map faults trim"
-    assert " ".join(names) == in_order
+    in_order = "fly figures report bag replay monte-carlo table map compare sensitivity worst rare"
+    assert " ".join(names) == f"{in_order} faults trim linearise"
     flying = told("fly", "--help").stdout
     assert all(name in flying.replace(",", " ").split() for name in case_names())
 

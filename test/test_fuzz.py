@@ -130,7 +130,10 @@ class Fuzzed:
             self.node._flying, self.node.step = True, 5000
 
     def refused(self):
-        return sum(self.node.health.total.values())
+        """Messages that were refused; a good one may ask for more than the vehicle is allowed."""
+        limits = (Fault.CLIMB_LIMITED, Fault.ALPHA_LIMITED)
+        total = self.node.health.total
+        return sum(count for fault, count in total.items() if fault not in limits)
 
     def send(self, batch):
         before = self.refused()

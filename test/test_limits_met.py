@@ -73,7 +73,7 @@ def test_who_limits_what_is_asked_for_counts_it_and_the_summary_has_its_time(
     }
     assert counts["climb_limited"] == 301, "from 1 s on: 5 km are 50 m/s, a climb of 1.6 deg"
     assert counts["bank_limited"] == 101, "from 3 s on: 0.15 deg/s take 26.9 deg at 1900 m/s"
-    assert counts["reference_out_of_reach"] == 4, "looked for at 1, 2, 3 and 4 s"
+    assert counts["out_of_reach"] == 4, "looked for at 1, 2, 3 and 4 s"
     told = bag_info(tmp_path / "bag")["faults"]
     assert told["guidance"] | told["outer_intermediate"] == counts
     record = read_bag(tmp_path / "bag")

@@ -43,7 +43,7 @@ def linearise(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Linearise the vehicle at a trim, without its control: A, B, C, D and the modes.
+    """Linearise the vehicle at a trim: A, B, C, D and the modes.
 
     In continuous time, and sampled at 100 Hz on the hardware of the case, with servos, delay and
     sensors.

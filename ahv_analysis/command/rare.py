@@ -37,7 +37,7 @@ def rare(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Estimate the probability that a drawn vehicle is lost, however rare that is.
+    """Estimate how probable a loss is that is too rare to count.
 
     Subset simulation over the nine multipliers, each uniform from 1 - LEVEL to 1 + LEVEL; all else
     is as in the case, the noise of hardware too. The interval comes from the repetitions.

@@ -159,7 +159,7 @@ class Fault(Enum):
         "it is held there",
         "at once",
     )
-    REFERENCE_OUT_OF_REACH = Response(
+    OUT_OF_REACH = Response(
         "guidance",
         "the nominal vehicle, with the mass that is measured, has no level flight at the "
         "reference, looked for once a second: angle of attack, elevons, throttle, or range of the "
