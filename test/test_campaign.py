@@ -299,9 +299,9 @@ def test_when_a_scheduler_dies_what_was_flown_is_kept(flown, tmp_path):
 def test_a_folder_gives_its_campaign_back(flown):
     _, folder = flown
     assert open_campaign(folder) == campaign()
-    with pytest.raises(CampaignError, match=r"choose from by --level; there are: 0\.4"):
+    with pytest.raises(CampaignError, match=r"holds no campaign of level 0\.3; there are: 0\.4"):
         open_campaign(folder, 0.3)
-    with pytest.raises(CampaignError, match="none"):
+    with pytest.raises(CampaignError, match="nowhere holds no campaign$"):
         open_campaign(folder / "nowhere")
 
 
@@ -607,7 +607,7 @@ def test_ctrl_c_keeps_what_was_flown(tmp_path):
         (("monte-carlo", "--controller", "nope"), ("nope", "neuro_adaptive_di")),
         (("monte-carlo", "--level", 2.0), ("level 2", "0 to 0.9")),
         (("monte-carlo", "--runs", 0), ("--runs",)),
-        (("monte-carlo", "rerun", "nowhere", 1), ("nowhere", "none")),
+        (("monte-carlo", "rerun", "nowhere", 1), ("nowhere", "no campaign")),
         (("table", "--runs", "many"), ("--runs", "many")),
         (("table", "--profile", "loop"), ("profile 'loop'", "waypoints")),
         (("figures", ".", "--out", "x"), ("not a bag",)),

@@ -386,11 +386,13 @@ def open_campaign(folder: Path, level: float | None = None) -> Campaign:
     """Campaign that a folder holds, of `level` if it holds several."""
     found = {path.name.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*"))}
     chosen = [name for name in found if level is None or name == level_name(level)]
-    if len(chosen) != 1:
-        raise CampaignError(
-            f"{folder} holds {len(chosen)} campaigns to choose from by --level; "
-            f"there are: {', '.join(found) or 'none'}"
-        )
+    there = f"there are: {', '.join(found)}"
+    if not found:
+        raise CampaignError(f"{folder} holds no campaign")
+    if not chosen:
+        raise CampaignError(f"{folder} holds no campaign of level {level}; {there}")
+    if len(chosen) > 1:
+        raise CampaignError(f"{folder} holds several campaigns; choose one by --level; {there}")
     files = part_files(found[chosen[0]])
     if not files:
         raise CampaignError(f"{found[chosen[0]]} holds no runs of a campaign")
