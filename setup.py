@@ -66,7 +66,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]>=7.1,<7.2", "ros-jazzy-common-interfaces"],
         # campaigns on a dask.distributed cluster
         "dask": ["distributed"],
-        # linear models as its state spaces, and `ahv margins`
+        # linear models as its state spaces
         "control": ["control>=0.10.1"],
         "test": [
             "control>=0.10.1",

@@ -65,6 +65,16 @@ def test_a_signal_waits_until_what_must_be_whole_is_over(number):
     assert result.stderr == "ahv: interrupted after it\n"
 
 
+def test_processes_that_are_left_behind_say_nothing():
+    result = program(
+        "from ahv_analysis.campaign.workers import processes\n"
+        "end_on_signals()\n"
+        "processes(1).submit(abs, -1).result()\n"
+        "os.kill(os.getpid(), number)"
+    )
+    assert (result.returncode, result.stderr) == (128 + signal.SIGINT, "ahv: interrupted\n")
+
+
 def test_an_ignored_signal_stays_ignored():
     result = program(
         "signal.signal(number, signal.SIG_IGN)\n"

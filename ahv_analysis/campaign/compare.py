@@ -22,7 +22,6 @@ BLOCK = 4_000_000  # numbers of a bootstrap that are in memory at a time
 CONFIDENCE = 0.95
 ROUNDING = 1e-9  # in the unit of any metric
 SAME_DRAWS = ("level", "seed", "random_starts", "draws")
-COMPUTED = ("source", "numba", "llvmlite", "numpy", "processor")
 
 
 class Difference(NamedTuple):

@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import resource_tracker
 
 
 def _begin() -> None:
@@ -21,7 +22,23 @@ def _end_with_parent() -> None:
     os._exit(0)
 
 
+def _clean_up_in_silence() -> None:
+    """Start the process that removes what this one leaves, and have it tell nobody.
+
+    A campaign that a signal ends leaves semaphores: to remove them is what that process is for.
+    """
+    said, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        os.dup2(said, 2)
+        os.close(said)
+        os.close(nowhere)
+
+
 def processes(workers: int) -> ProcessPoolExecutor:
     """As many processes as `workers`, each with everything loaded anew."""
+    _clean_up_in_silence()
     context = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin)

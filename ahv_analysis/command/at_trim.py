@@ -1,5 +1,5 @@
 # Copyright 2026 ahv developers, Apache-2.0
-"""A case somewhere else, as an option says it: what `ahv linearise` and `ahv margins` share."""
+"""A case somewhere else, as the options of `ahv linearise` say it."""
 
 from typing import TYPE_CHECKING, Annotated
 

@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The commands of campaigns: `ahv monte-carlo`, its `rerun`, and `ahv table`."""
 
-import json
 import logging
 import os
 import sys
@@ -31,6 +30,7 @@ from ahv_analysis.command.console import (
     show_table,
     words_of,
 )
+from ahv_analysis.command.results import write_numbers
 from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_plant.dispersion import HIGHEST_LEVEL
 from ahv_plant.model.constants import STEP
@@ -355,7 +355,7 @@ def table(
         "wall_s": time.perf_counter() - started,
         "rows": [row.flown | {"against_report": row.verdict} for row in rows],
     }
-    (folder / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    write_numbers(folder / f"{name}.json", content)
     if as_json:
         print_json(content)
     else:

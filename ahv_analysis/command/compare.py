@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The command `ahv compare`: two campaigns or two flights, for people and as a gate."""
 
-import json
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ahv_analysis.command.console import Json, UsageError, print_json, show_table
-from ahv_analysis.interrupt import signals_wait
+from ahv_analysis.command.results import results_in, write_numbers
 
 if TYPE_CHECKING:  # it takes long to load
     from matplotlib.figure import Figure
@@ -48,6 +47,9 @@ def compare(
     differs by more than its --tolerance. Flights: exit code 1 if a quantity differs by more than
     its --tolerance, which is 0, the same bits, where none is given.
     """
+    from ahv_analysis.junit import write_junit
+    from ahv_analysis.report.picture import save_picture
+
     allowed = _tolerances(tolerance or [])
     kinds = [_is_campaign(folder) for folder in (a, b)]
     if kinds[0] != kinds[1]:
@@ -58,18 +60,11 @@ def compare(
     content, checks, figure = compared
     folder = out or Path("comparisons") / "-".join(_names(a, b))
     content |= {"passed": all(check.passed for check in checks), "out": str(folder)}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with signals_wait():
-            figure.savefig(folder / "compare.png", metadata={"Software": None})
-            text = json.dumps(content, indent=2, allow_nan=False) + "\n"
-            (folder / "compare.json").write_text(text, encoding="utf-8")
-            if junit is not None:
-                from ahv_analysis.junit import write_junit
-
-                write_junit(junit, "ahv compare", checks)
-    except OSError as error:
-        raise UsageError(f"cannot write to {error.filename}: {error.strerror}") from error
+    with results_in(folder):
+        save_picture(figure, folder / "compare.png")
+        write_numbers(folder / "compare.json", content)
+        if junit is not None:
+            write_junit(junit, "ahv compare", checks)
     if as_json:
         print_json(content)
     elif kinds[0]:

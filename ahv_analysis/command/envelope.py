@@ -33,7 +33,7 @@ def make_envelope(
     """Trim at every point, keep table and picture, and say how many have a trim."""
     from ahv_analysis.point_file import write_points
     from ahv_analysis.report.envelope_figure import Grid, draw_envelope
-    from ahv_analysis.report.map_figure import save_map
+    from ahv_analysis.report.picture import save_picture
 
     grid = Grid(
         read_values("--altitude", ALTITUDES if altitude is None else altitude, "m", ROWS),
@@ -64,7 +64,7 @@ def make_envelope(
     rows = [_row(point) for point in points]
     write_points(folder, "trim", rows, described)
     title = _title(geometric)
-    save_map(draw_envelope(points, grid, title), folder / "trim.png")
+    save_picture(draw_envelope(points, grid, title), folder / "trim.png")
     trimmed = sum(point.within_limits for point in points)
     if as_json:
         print_json({**described, "points": rows, "wall_s": wall, "out": str(folder)})

@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The command `ahv fly`."""
 
-import json
 import os
 import re
 import time
@@ -28,6 +27,7 @@ from ahv_analysis.command.console import (
     progress_bar,
     show_table,
 )
+from ahv_analysis.command.results import write_numbers
 from ahv_analysis.errors import BagError, GraphError
 from ahv_analysis.interrupt import interrupted_says, last_of_all, signals_wait
 from ahv_msgs_py.node.network import DISCOVERY_RANGE
@@ -37,13 +37,15 @@ from ahv_plant.model.constants import STEP, STEP_NS
 
 
 class CaseCommand(TyperCommand):
-    """A command whose help lists the cases and profiles."""
+    """A command whose help lists the cases, profiles and laws."""
 
     def format_epilog(self, context: Any, formatter: Any) -> None:
-        """List the cases and the profiles."""
+        """List what there is by name."""
         from ahv_analysis.flight.case import case_names, profile_names
+        from ahv_control.law_file import law_names
 
-        for title, names in (("Cases", case_names()), ("Profiles", profile_names())):
+        known = {"Cases": case_names(), "Profiles": profile_names(), "Laws": law_names()}
+        for title, names in known.items():
             with formatter.section(title):
                 formatter.write_text(", ".join(names))
 
@@ -169,7 +171,7 @@ def fly(
         }
     summary |= {"wall_s": wall, "real_time_factor": record.steps * STEP / wall}
     with signals_wait():
-        summary_file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
+        write_numbers(summary_file, summary)
     if as_json:
         print_json(summary)
     else:

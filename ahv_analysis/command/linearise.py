@@ -82,14 +82,14 @@ def linearise(
     files = []
     if out is not None:
         from ahv_analysis.gnc.mode_figure import draw_modes
-        from ahv_analysis.report.map_figure import save_map
+        from ahv_analysis.report.picture import save_picture
 
         try:
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UsageError(f"{out} cannot hold a model: {error.strerror}") from error
         write_model(vehicle, out / "vehicle.npz")
-        save_map(draw_modes(found, _where(vehicle)), out / "modes.png")
+        save_picture(draw_modes(found, _where(vehicle)), out / "modes.png")
         files = ["vehicle.npz", "modes.png"]
         if equipped is not None:
             write_model(equipped, out / "on_hardware.npz")

@@ -70,7 +70,8 @@ def map_rates(
     """
     from ahv_analysis.campaign.axis import LEVEL, read_settings
     from ahv_analysis.campaign.map import fly_map, rates, read_map, write_map
-    from ahv_analysis.report.map_figure import draw_map, save_map
+    from ahv_analysis.report.map_figure import draw_map
+    from ahv_analysis.report.picture import save_picture
 
     changes = read_settings(settings or [])
     flown = read_map(
@@ -115,7 +116,7 @@ def map_rates(
     write_map(folder, points, described)
     title = assumptions(described)
     figure = draw_map(*axes, rates(flown, points), textwrap.fill(title, 68))
-    save_map(figure, folder / "map.png")
+    save_picture(figure, folder / "map.png")
     if as_json:
         rows = [point._asdict() for point in points]
         print_json({**described, "points": rows, "wall_s": wall, "out": str(folder)})

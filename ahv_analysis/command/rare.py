@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The command `ahv rare`: the probability of losses too rare to be counted."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,8 +18,8 @@ from ahv_analysis.command.console import (
     show_table,
     words_of,
 )
+from ahv_analysis.command.results import results_in, write_numbers
 from ahv_analysis.command.worst import Search, vehicles_of
-from ahv_analysis.interrupt import signals_wait
 
 
 def rare(
@@ -48,6 +47,7 @@ def rare(
     from ahv_analysis.campaign.rare import combine, subset_simulation
     from ahv_analysis.campaign.vehicles import FACTORS, LOSS
     from ahv_analysis.flight.case import load_case
+    from ahv_analysis.report.picture import save_picture
     from ahv_analysis.report.worst_figure import draw_rare
     from ahv_plant.dispersion import HIGHEST_LEVEL, Dispersion
 
@@ -93,8 +93,8 @@ def rare(
         "level": level,
         "seed": seed,
         "flights": asked,
-        "probability": found.probability,
-        "interval": [found.low, found.high],
+        "probability": found.probability if found.found else None,  # none found is not zero
+        "interval": [found.low, found.high] if found.found else None,
         "repetitions": [
             {"probability": one.probability, "thresholds": one.thresholds, "shares": one.shares}
             for one in done
@@ -103,13 +103,9 @@ def rare(
         "out": str(folder),
     }
     figure = draw_rare(found, title.replace(": ", ":\n"))
-    try:
-        with signals_wait():
-            figure.savefig(folder / "rare.png", metadata={"Software": None})
-            text = json.dumps(content, indent=2) + "\n"
-            (folder / "rare.json").write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"cannot write to {folder}: {error.strerror}") from error
+    with results_in(folder):
+        save_picture(figure, folder / "rare.png")
+        write_numbers(folder / "rare.json", content)
     if as_json:
         print_json(content)
         return

@@ -1,15 +1,14 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The command `ahv sensitivity`: which of what was drawn decides."""
 
-import json
 import textwrap
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ahv_analysis.command.console import Json, UsageError, print_json, progress_bar, show_rows
-from ahv_analysis.interrupt import signals_wait
+from ahv_analysis.command.console import Json, print_json, progress_bar, show_rows
+from ahv_analysis.command.results import results_in, write_numbers
 
 
 def sensitivity(
@@ -35,6 +34,7 @@ def sensitivity(
     from ahv_analysis.campaign.campaign import open_campaign
     from ahv_analysis.campaign.columns import factors, is_lost, quantity, read_columns
     from ahv_analysis.campaign.sensitivity import PERMUTATIONS, check_sensitivities, sensitivities
+    from ahv_analysis.report.picture import save_picture
     from ahv_analysis.report.sensitivity_figure import draw_scatter, draw_sensitivity
 
     flown = open_campaign(campaign, level)
@@ -55,16 +55,10 @@ def sensitivity(
         "out": str(folder),
     }
     title = "\n".join([words, *textwrap.wrap(found.sentence, 150)])
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with signals_wait():
-            for draw, name in ((draw_sensitivity, "sensitivity"), (draw_scatter, "scatter")):
-                figure = draw(found, values, lost, drawn, title)
-                figure.savefig(folder / f"{name}.png", metadata={"Software": None})
-            text = json.dumps(content, indent=2, allow_nan=False) + "\n"
-            (folder / "sensitivity.json").write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"cannot write to {folder}: {error.strerror}") from error
+    with results_in(folder):
+        for draw, name in ((draw_sensitivity, "sensitivity"), (draw_scatter, "scatter")):
+            save_picture(draw(found, values, lost, drawn, title), folder / f"{name}.png")
+        write_numbers(folder / "sensitivity.json", content)
     if as_json:
         print_json(content)
         return

@@ -1,7 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The command `ahv worst`: the worst vehicle of a box, and the largest box without a loss."""
 
-import json
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,6 +23,7 @@ from ahv_analysis.command.console import (
     show_table,
     words_of,
 )
+from ahv_analysis.command.results import results_in, write_numbers
 from ahv_analysis.interrupt import interrupted_says, signals_wait
 
 if TYPE_CHECKING:  # it takes long to load
@@ -34,7 +34,6 @@ if TYPE_CHECKING:  # it takes long to load
 
 RESOLUTION = 0.01  # [-] of the largest level
 PARTS = 64  # of the range of a parameter
-RESUMED = "what was flown is kept, and the same command resumes"
 
 
 class Search(NamedTuple):
@@ -115,13 +114,13 @@ def vehicles_of(search: Search, case: "Case", folder: Path) -> "Iterator[Vehicle
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot hold a search: {error.strerror}") from error
-    interrupted_says(lambda: RESUMED)
     with (
         executor_of(search.workers, None) as pool,
         progress_bar(f"search with {case.name}", None, search.hidden, unit="flights") as progress,
         signals_wait() as interrupted,
     ):
         flights = Vehicles(case, folder / "flown.parquet", pool, progress, interrupted)
+        interrupted_says(lambda: f"after {flights.asked} flights; the same command resumes")
         try:
             yield flights
         finally:
@@ -340,12 +339,11 @@ def _resolution(axis: "Axis", ends: tuple[float, float]) -> float:
 def _write(
     folder: Path, name: str, content: dict[str, Any], figure: Any, texts: dict[Path, str]
 ) -> None:
-    try:
-        with signals_wait():
-            figure.savefig(folder / f"{name}.png", metadata={"Software": None})
-            kept = {key: value for key, value in content.items() if key != "said"}
-            texts = {**texts, folder / f"{name}.json": json.dumps(kept, indent=2) + "\n"}
-            for path, text in texts.items():
-                path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"cannot write to {folder}: {error.strerror}") from error
+    from ahv_analysis.report.picture import save_picture
+
+    with results_in(folder):
+        save_picture(figure, folder / f"{name}.png")
+        kept = {key: value for key, value in content.items() if key != "said"}
+        write_numbers(folder / f"{name}.json", kept)
+        for path, text in texts.items():
+            path.write_text(text, encoding="utf-8")

@@ -183,11 +183,6 @@ def load_case(
     return case
 
 
-def hardware_names() -> list[str]:
-    """Hardware that comes with the package."""
-    return _names("hardware")
-
-
 def profile_names() -> list[str]:
     """Profiles that come with the package: what to fly, by time or by waypoints."""
     return _names("profiles")

@@ -1,8 +1,6 @@
 # Copyright 2026 ahv developers, Apache-2.0
 """The picture of a map: success rate as colours, with contour lines."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -39,8 +37,3 @@ def draw_map(x: Axis, y: Axis, rates: Array, title: str) -> Figure:
 def _ticks(values: tuple[float, ...]) -> tuple[float, ...]:
     """Values to name: where points were flown, of many only some."""
     return values[:: -(-len(values) // MOST_TICKS)]
-
-
-def save_map(figure: Figure, path: Path) -> None:
-    """Write the picture, the same each time."""
-    figure.savefig(path, metadata={"Software": None})
