@@ -72,6 +72,7 @@ def record(case):
     return record_of(fly(case), geometric=False)
 
 
+@pytest.mark.unit
 def test_a_law_of_one_file_flies_like_one_of_the_report(record):
     """It turns the same vehicle from the same start, by gains of its own."""
     summary = summarize(record, "")
@@ -80,6 +81,7 @@ def test_a_law_of_one_file_flies_like_one_of_the_report(record):
     assert not np.array_equal(ours.surfaces[0], record.surfaces[0])
 
 
+@pytest.mark.graph
 def test_on_the_graph_it_commands_the_same_bits_and_again_in_a_replay(
     case, record, tmp_path, domain
 ):
@@ -94,6 +96,8 @@ def test_on_the_graph_it_commands_the_same_bits_and_again_in_a_replay(
     )
 
 
+@pytest.mark.unit
+@pytest.mark.compiled
 @pytest.mark.parametrize("hardware", ["ideal", pytest.param("typical", marks=pytest.mark.slow)])
 def test_a_lane_is_a_flight_alone(hardware):
     case = load_case("nominal_di", SHORT, hardware=hardware, law=str(MINE))
@@ -104,6 +108,7 @@ def test_a_lane_is_a_flight_alone(hardware):
             assert np.array_equal(column[0], rows[name][run_number], equal_nan=True), name
 
 
+@pytest.mark.unit
 def test_in_plain_python_it_is_the_same_law(case, record, tmp_path):
     path = tmp_path / "plain.py"
     path.write_text(MINE.read_text().replace("@elementwise\ndef st", "def st"))
@@ -114,6 +119,7 @@ def test_in_plain_python_it_is_the_same_law(case, record, tmp_path):
     assert not np.any(record.rate_commands[:]), "it commands none"
 
 
+@pytest.mark.unit
 def test_a_setting_is_a_parameter_of_the_node_and_changes_the_flight(tmp_path):
     law = written(tmp_path, FIXED)
     file = tmp_path / "flown.yaml"
@@ -129,6 +135,7 @@ def test_a_setting_is_a_parameter_of_the_node_and_changes_the_flight(tmp_path):
         load_case(str(file), SHORT)
 
 
+@pytest.mark.unit
 @pytest.mark.parametrize(
     ("body", "cause", "raised"),
     [
@@ -154,6 +161,7 @@ def test_a_law_that_fails_ends_no_program_and_is_named(body, cause, raised, tmp_
     assert fly_runs(campaign, 0, 1)["cause"][0] == (6 if cause == "law_failed" else 0)
 
 
+@pytest.mark.unit
 def test_what_is_asked_beyond_the_stops_is_held_there(tmp_path):
     law = written(tmp_path, "return memory, direct(Surfaces(1e9, -1e9, 0.0), -7.0)\n")
     flown = [step.commands for step in fly(load_case("nominal_di", {"duration": 0.2}, law=law))]
@@ -165,6 +173,7 @@ def test_what_is_asked_beyond_the_stops_is_held_there(tmp_path):
 MARKED = HEAD.replace("def start", "@elementwise\ndef start") + "\n@elementwise\n"
 
 
+@pytest.mark.unit
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -187,6 +196,7 @@ def test_what_keeps_a_law_from_the_lanes_is_said_with_its_line(body, words, tmp_
     assert f"mine.py, line {line}: " in str(refused.value) and words in str(refused.value)
 
 
+@pytest.mark.unit
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -211,6 +221,7 @@ def test_a_file_that_is_no_law_is_refused_in_a_sentence(text, words, tmp_path):
     assert refused.output.count("\n") == 1 and not list(tmp_path.glob("bag"))
 
 
+@pytest.mark.unit
 def test_what_another_source_flew_is_not_replayed(tmp_path):
     law = written(tmp_path, FIXED)
     before = law_identity(law)

@@ -65,6 +65,7 @@ def test_a_model_that_is_right_has_the_surfaces_where_they_are_measured(order):
     assert np.max(found[200:]) < 1e-9
 
 
+@pytest.mark.unit
 def test_a_model_of_half_the_bandwidth_has_them_elsewhere():
     found = deviation(exact(1, bandwidth=15.0))
     assert np.max(found) > 0.5
@@ -93,6 +94,7 @@ def test_what_moves_late_is_no_disturbance_to_who_knows_how_late():
     assert 3.0 * right < wrong < 0.5 * commanded
 
 
+@pytest.mark.unit
 def test_a_servo_of_first_order_follows_an_exponential_and_no_faster_than_its_limit():
     """x = c (1 - exp(-w t)), from the textbook; the limit holds, and so do the stops."""
     model = ServoModel(1, 30.0, 0.7, float("inf"), -40.0 * RADIANS, 30.0 * RADIANS)
@@ -154,6 +156,7 @@ def test_only_who_hears_measured_surfaces_listens_to_them(heard, listens):
     rclpy.shutdown(context=context)
 
 
+@pytest.mark.unit
 def test_a_choice_that_is_none_is_named():
     with pytest.raises(ParameterError) as error:
         modelled(learner={"observer_surfaces": "guessed"})
